@@ -13,7 +13,10 @@ class InputError : public std::runtime_error {
  public:
   InputError(std::string_view source, std::string_view where, std::string_view what,
              std::string_view remedy = {})
-      : std::runtime_error(compose(source, where, what, remedy)) {}
+      : std::runtime_error(compose(source, where, what, remedy)), source_(source), where_(where) {}
+
+  [[nodiscard]] const std::string& source() const { return source_; }
+  [[nodiscard]] const std::string& where() const { return where_; }
 
  private:
   static std::string compose(std::string_view source, std::string_view where, std::string_view what,
@@ -24,6 +27,8 @@ class InputError : public std::runtime_error {
     if (!remedy.empty()) message.append(" (").append(remedy).append(")");
     return message;
   }
+
+  std::string source_, where_;
 };
 
 }  // namespace catgs

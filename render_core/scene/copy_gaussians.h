@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cstddef>
-#include <cstdint>
-#include <span>
 
 #include "render_core/scene/gaussian_cloud.h"
 
@@ -34,22 +32,6 @@ inline GaussianCloud with_sh_degree(GaussianCloud cloud, int sh_degree) {
   wider.resize(cloud.size(), sh_degree);
   copy_gaussians(cloud, 0, wider);
   return wider;
-}
-
-/// The Gaussians order[0], order[1], … of a cloud.
-inline GaussianCloud reordered(const GaussianCloud& cloud, std::span<const std::uint32_t> order) {
-  GaussianCloud sorted;
-  sorted.model = cloud.model;
-  sorted.resize(order.size(), cloud.sh_degree);
-  const auto stride = static_cast<std::size_t>(cloud.sh_count());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    sorted.mean[i] = cloud.mean[order[i]];
-    sorted.rotation[i] = cloud.rotation[order[i]];
-    sorted.scale[i] = cloud.scale[order[i]];
-    sorted.opacity[i] = cloud.opacity[order[i]];
-    std::copy_n(cloud.sh_of(order[i]), stride, sorted.sh.data() + i * stride);
-  }
-  return sorted;
 }
 
 }  // namespace catgs

@@ -30,7 +30,6 @@ void add_bench_command(CLI::App& app);
 void add_compare_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
 void add_floors_command(CLI::App& app);
-void add_formats_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
 void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);

@@ -29,7 +29,6 @@ int run(int argc, char** argv) {
   add_compare_command(app);
   add_convert_command(app);
   add_floors_command(app);
-  add_formats_command(app);
   add_frames_command(app);
   add_info_command(app);
   add_paper_command(app);

@@ -183,7 +183,8 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   setup.view = view_settings(options.pipeline);
   setup.predictor = predictor_settings(options.pipeline);
   if (options.in_pages()) {
-    SceneInPages scene = open_in_pages(options.scene, options.threads, quiet);
+    SceneInPages scene =
+        open_in_pages(locate_scene(options.scene.path), options.scene, options.threads, quiet);
     setup.tree = std::move(scene.tree);
     setup.scene = std::move(scene.outline);
     setup.detail_px = options.detail_px.value_or(0.0f);

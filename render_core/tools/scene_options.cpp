@@ -67,16 +67,22 @@ LoadOptions load_options(const SceneOptions& options, int threads, Progress& pro
 
 }  // namespace
 
-Scene load_scene(const SceneOptions& options, int threads, bool quiet, bool first_view) {
+Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
+  return load_scene(locate_scene(options.path), options, threads, quiet);
+}
+
+Scene load_scene(const SceneLocation& location, const SceneOptions& options, int threads,
+                 bool quiet, bool first_view) {
   Progress progress("loading", quiet);
   LoadOptions load = load_options(options, threads, progress);
   load.first_view = first_view;
-  return load_scene(options.path, load);
+  return load_scene(location, load);
 }
 
-SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet) {
+SceneInPages open_in_pages(const SceneLocation& location, const SceneOptions& options, int threads,
+                           bool quiet) {
   Progress progress("opening", quiet);
-  return open_in_pages(options.path, load_options(options, threads, progress));
+  return open_in_pages(location, load_options(options, threads, progress));
 }
 
 void add_lens_options(CLI::App& command, LensOptions& options) {

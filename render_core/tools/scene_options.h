@@ -29,11 +29,15 @@ std::optional<SplatModel> model_of(const SceneOptions& options);
 /// The direction that --up names. Throws InputError.
 std::optional<glm::vec3> up_of(const SceneOptions& options);
 
-/// Shows its progress on a terminal. `first_view`: see LoadOptions. Throws InputError.
-Scene load_scene(const SceneOptions& options, int threads, bool quiet, bool first_view = true);
+/// Loads the scene of the options. Shows its progress on a terminal. Throws InputError.
+Scene load_scene(const SceneOptions& options, int threads, bool quiet);
+/// The same for a scene that was located. `first_view`: see LoadOptions.
+Scene load_scene(const SceneLocation& location, const SceneOptions& options, int threads,
+                 bool quiet, bool first_view = true);
 
 /// The same for a scene in pages.
-SceneInPages open_in_pages(const SceneOptions& options, int threads, bool quiet);
+SceneInPages open_in_pages(const SceneLocation& location, const SceneOptions& options, int threads,
+                           bool quiet);
 
 /// A camera without a pose.
 struct LensOptions {

@@ -12,9 +12,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
-#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/scene_by_parts.h"
-#include "render_core/scene/tree/tree_file.h"
 #include "render_core/walk/eye_height.h"
 #include "render_core/walk/find_ground.h"
 #include "render_core/walk/walk_file.h"
@@ -28,31 +26,29 @@ namespace {
 
 constexpr std::uint64_t most_whole_gaussians = 4'000'000;  // of a scene that is read as a whole
 
-bool is_tree(const std::filesystem::path& path) {
-  return std::filesystem::is_regular_file(path) && is_tree(FileSource(path));
-}
+std::string spec_of(const GroundSource& source) { return source.scene.given.string(); }
 
 SceneByParts open(const GroundSource& source, const std::shared_ptr<ThreadPool>& pool,
                   const std::function<void()>& progress) {
   LoadOptions options;
   options.threads = pool->threads();
   options.progress = [&](double) { progress(); };
-  if (!source.tree.empty()) return by_parts(open_in_pages(source.tree, options, source.spec), pool);
-  const SceneLocation location = locate_scene(source.spec);
-  if (is_tree(location.path)) return by_parts(open_in_pages(source.spec, options), pool);
+  const SceneLocation& scene = source.scene;
+  if (!source.tree.empty()) return by_parts(open_in_pages(source.tree, scene, options), pool);
+  if (scene.is_in_pages()) return by_parts(open_in_pages(scene, options), pool);
   constexpr std::uint64_t part_rows = 1'000'000;
-  if (location.has_levels()) {
+  if (scene.has_levels()) {
     options.lod = source.levels.lod;
     options.gaussian_budget = source.levels.gaussian_budget;
   }
   if (!options.lod && !options.gaussian_budget)
-    if (auto parted = scene_in_parts(source.spec, options, pool, part_rows, false))
+    if (auto parted = scene_in_parts(scene, options, pool, part_rows, false))
       return by_parts(*std::move(parted));
-  if (read_scene_size(source.spec, options).gaussians > most_whole_gaussians)
-    throw InputError(source.spec, "", "has too many Gaussians to be read as a whole",
+  if (read_scene_size(scene, options).gaussians > most_whole_gaussians)
+    throw InputError(spec_of(source), "", "has too many Gaussians to be read as a whole",
                      "with --cache-dir it gets a tree");
   options.first_view = false;
-  return by_parts(load_scene(source.spec, options));
+  return by_parts(load_scene(scene, options));
 }
 
 SceneHints hints_of(const GroundSource& source) {
@@ -75,15 +71,15 @@ auto known_of_scene(const Body& body) {
 
 float eye_height_of(const GroundSource& source, const GaussianCloud& sample) {
   if (const auto height = walk::eye_height_of(sample, hints_of(source))) return *height;
-  throw InputError(source.spec, "", "has no floor and ceiling that tell how large people are",
+  throw InputError(spec_of(source), "", "has no floor and ceiling that tell how large people are",
                    "its sidecar can name metres_per_unit");
 }
 
 }  // namespace
 
-GroundSource ground_source(const std::string& spec, const SceneFacts& facts) {
+GroundSource ground_source(const SceneLocation& scene, const SceneFacts& facts) {
   GroundSource source;
-  source.spec = spec;
+  source.scene = scene;
   source.start = facts.start_pose.position;
   source.up = facts.up;
   source.metres_per_unit = facts.about.metres_per_unit;
@@ -91,7 +87,7 @@ GroundSource ground_source(const std::string& spec, const SceneFacts& facts) {
 }
 
 bool same_ground(const GroundSource& one, const GroundSource& other) {
-  return one.spec == other.spec && one.start == other.start && one.up == other.up &&
+  return one.scene.given == other.scene.given && one.start == other.start && one.up == other.up &&
          one.metres_per_unit == other.metres_per_unit;
 }
 
@@ -106,23 +102,23 @@ std::string compute_ground(const GroundSource& source, int threads,
   const auto take = [&](const GaussianCloud& part) {
     known_of_scene([&] { occupancy->add(part, *pool, progress); });
   };
-  if (is_synthetic(source.spec)) {
+  const std::string spec = spec_of(source);
+  if (is_synthetic(spec)) {
     begin(eye_height_of(source, {}));  // it has a unit
-    synthesize_parts(source.spec, *pool, take);
+    synthesize_parts(spec, *pool, take);
   } else {
     const SceneByParts scene = open(source, pool, progress);
     begin(known_of_scene([&] { return eye_height_of(source, *scene.sample); }));
     scene.each(take);
   }
-  return walk::pack(known_of_scene([&] {
-    return walk::find_ground(*occupancy, {}, source.start, source.spec, *pool, progress);
-  }));
+  return walk::pack(known_of_scene(
+      [&] { return walk::find_ground(*occupancy, {}, source.start, spec, *pool, progress); }));
 }
 
 std::string ground_name(const GroundSource& source) {
   constexpr int version = 1;  // of what is found in a scene
-  const std::string scene =
-      is_synthetic(source.spec) ? source.spec : tree_name(source.spec, source.levels);
+  const std::string spec = spec_of(source);
+  const std::string scene = is_synthetic(spec) ? spec : tree_name(source.scene, source.levels);
   const TokenDigest digest = digest_of(fmt::format(
       "{}\n{} {} {}\n{} {} {}\n{} {}", scene, source.start.x, source.start.y, source.start.z,
       source.up.x, source.up.y, source.up.z, source.metres_per_unit, version));

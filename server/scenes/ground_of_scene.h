@@ -14,14 +14,14 @@ namespace catgs {
 
 /// All that the ground of a scene depends on.
 struct GroundSource {
-  std::string spec;              // a path, or synth:KIND:COUNT[:SEED]
+  SceneLocation scene;
   std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
   LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
   std::filesystem::path beside;  // a .walk file of the author's; empty: nowhere
   glm::vec3 start, up;           // of the scene as it is shown
   float metres_per_unit = 0.0f;  // 0: not said
 };
-GroundSource ground_source(const std::string& spec, const SceneFacts& facts);
+GroundSource ground_source(const SceneLocation& scene, const SceneFacts& facts);
 /// True if both have the same ground as long as the scene's files are the same.
 bool same_ground(const GroundSource& one, const GroundSource& other);
 

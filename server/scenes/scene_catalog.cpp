@@ -15,7 +15,6 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/scene/files/load_scene.h"
-#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/tree/tree_file.h"
 #include "render_core/synth/synth.h"
@@ -65,26 +64,17 @@ Scene synthesize(const std::string& spec) {
   return catgs::synthesize(kind, count, seed);
 }
 
-bool has_levels(const std::string& spec) {
-  return !is_synthetic(spec) && locate_scene(spec).has_levels();
-}
-
-bool is_tree(const std::string& spec) {
-  const SceneLocation location = locate_scene(spec);
-  return location.kind == SceneLocation::Kind::file && is_tree(FileSource(location.path));
-}
-
 /// A tree of a cache can be built again, so it is used only if all of it is there.
-SceneInPages open_cached(const std::filesystem::path& path, const std::string& spec,
+SceneInPages open_cached(const std::filesystem::path& path, const SceneLocation& made_of,
                          const LoadOptions& options) {
   const auto refuse = [&](std::string_view why) { throw UnusableTree(path.string(), {}, why); };
   constexpr std::string_view damaged = "pages are missing or damaged";
   // A mistake in the sidecar is no fault of the tree: it throws InputError here.
-  (void)model_in_sidecar(locate_scene(spec).hints);
+  (void)model_in_sidecar(made_of.hints);
   try {
     TreeFile tree(std::make_unique<FileSource>(path));
     if (tree.pages_in_file() < tree.shape().pages() || !tree.page(0)) refuse(damaged);
-    SceneInPages scene = open_in_pages(path, options, spec);
+    SceneInPages scene = open_in_pages(path, made_of, options);
     if (scene.tree->damage().pages > 0) refuse(damaged);
     return scene;
   } catch (const UnusableTree&) {
@@ -95,11 +85,11 @@ SceneInPages open_cached(const std::filesystem::path& path, const std::string& s
 }
 
 /// A scene in memory; or, with a tree, its outline.
-SceneInPages load(const std::string& spec, const SceneForm& form, const ServerConfig& config,
+SceneInPages load(const SceneLocation& location, const SceneForm& form, const ServerConfig& config,
                   LoadOptions options) {
-  if (is_synthetic(spec)) return {nullptr, synthesize(spec)};
-  if (!form.tree.empty()) return open_cached(form.tree, spec, options);
-  if (has_levels(spec)) {
+  if (location.format == nullptr) return {nullptr, synthesize(location.given.string())};
+  if (!form.tree.empty()) return open_cached(form.tree, location, options);
+  if (location.has_levels()) {
     const LoadOptions levels = chosen_levels(config);
     options.lod = levels.lod;
     options.gaussian_budget = levels.gaussian_budget;
@@ -108,8 +98,8 @@ SceneInPages load(const std::string& spec, const SceneForm& form, const ServerCo
       options.gaussian_budget = form.most_gaussians;
     }
   }
-  if (is_tree(spec)) return open_in_pages(spec, options);
-  return {nullptr, load_scene(spec, options)};
+  if (location.is_in_pages()) return open_in_pages(location, options);
+  return {nullptr, load_scene(location, options)};
 }
 
 }  // namespace
@@ -138,22 +128,28 @@ LoadOptions chosen_levels(const ServerConfig& config) {
   return levels;
 }
 
-void check_scenes(const ServerConfig& config) {
+std::vector<SceneLocation> locate_scenes(const ServerConfig& config) {
   for (const std::string& spec : config.scenes)
     if (std::error_code error; !is_synthetic(spec) && !std::filesystem::exists(spec, error))
       throw InputError("--scene " + spec, {}, "there is no such file or folder",
                        "check the path, or try --scene synth:city:300000");
+  std::vector<SceneLocation> scenes(config.scenes.size());
+  std::ranges::transform(config.scenes, scenes.begin(), [](const std::string& spec) {
+    return is_synthetic(spec) ? SceneLocation{.given = spec} : locate_scene(spec);
+  });
   if ((config.lod >= 0 || config.gaussian_budget > 0) && config.scene_folders.empty() &&
-      std::ranges::none_of(config.scenes, has_levels))
+      std::ranges::none_of(scenes, &SceneLocation::has_levels))
     throw InputError(config.lod >= 0 ? "--lod" : "--budget", {},
                      "no scene has levels of detail to choose from",
                      "levels and budgets are for streamed SOG, 3D Tiles and LCC2");
+  return scenes;
 }
 
 std::shared_ptr<const SceneEntry> load_scene(
-    const std::string& spec, const SceneForm& form,
+    const SceneLocation& location, const SceneForm& form,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress) {
+  const std::string spec = location.given.string();
   if (form.tree.empty())
     log_info({.event = "scene_loading"}, "loading {}", spec);
   else
@@ -162,7 +158,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
-  auto [tree, scene] = load(spec, form, config, std::move(options));
+  auto [tree, scene] = load(location, form, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
@@ -174,8 +170,8 @@ std::shared_ptr<const SceneEntry> load_scene(
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
-  if (!is_synthetic(spec)) {
-    entry->sidecar = locate_scene(spec).hints.sidecar;
+  if (location.format != nullptr) {
+    entry->sidecar = location.hints.sidecar;
     const std::optional<std::string> text = sidecar_text(entry->sidecar);
     if (text) entry->sidecar_tag = etag_of(*text);
     entry->tours = ToursAnswers(tours_of(entry->sidecar, text, config.media_origins));

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/load_scene.h"
@@ -25,9 +26,9 @@ std::uint64_t most_bytes(const SceneSize& size, const ServerConfig& config);
 /// The levels of detail that the configuration chooses.
 LoadOptions chosen_levels(const ServerConfig& config);
 
-/// Checks that the scenes of --scene are there, and that one has levels where levels are chosen.
-/// Throws InputError.
-void check_scenes(const ServerConfig& config);
+/// The scenes of --scene. Of synth:KIND:COUNT[:SEED], only `given` is set. Throws InputError if one
+/// is not there, or if levels are chosen and none has levels.
+std::vector<SceneLocation> locate_scenes(const ServerConfig& config);
 
 /// The Gaussians of synth:KIND:COUNT[:SEED], in parts that are let go once `take` returns. Throws
 /// InputError.
@@ -52,11 +53,11 @@ struct LoadedScene {
   bool unusable_tree = false;  // the error is that of the scene's tree
 };
 
-/// Loads one scene (a path, or synth:KIND:COUNT[:SEED]) in a form and builds its renderer with the
-/// options and pool of `core`. `id_of` makes the id from the name. `threads` threads read the file.
-/// `progress` is called repeatedly and may throw to cancel. Throws InputError or UnusableTree.
+/// Loads one scene in a form and builds its renderer with the options and pool of `core`. `id_of`
+/// makes the id from the name. `threads` threads read the file. `progress` is called repeatedly and
+/// may throw to cancel. Throws InputError or UnusableTree.
 std::shared_ptr<const SceneEntry> load_scene(
-    const std::string& spec, const SceneForm& form,
+    const SceneLocation& location, const SceneForm& form,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress = {});
 

@@ -50,18 +50,15 @@ fs::file_time_type time_of(const fs::path& path, const std::vector<fs::path>& be
 
 }  // namespace
 
-FoundScene look_at_scene(const fs::path& path, const SceneLook& look) {
+FoundScene look_at_scene(const SceneLocation& location, const SceneLook& look) {
   FoundScene found;
-  found.changed = time_of(path, files_beside(path));
-  const SceneLocation location = locate_scene(path);
-  found.path = path;
+  found.location = location;
   found.name = printable(to_utf8(location.name));
-  found.id = look.ids.id_of(path.string(), found.name);
-  found.has_levels = location.has_levels();
-  const LoadOptions levels = found.has_levels ? look.levels : LoadOptions();
-  found.size = read_scene_size(path, levels);
+  found.id = look.ids.id_of(location.given.string(), found.name);
+  const LoadOptions levels = location.has_levels() ? look.levels : LoadOptions();
+  found.size = read_scene_size(location, levels);
   found.about = about_in(location.hints.sidecar);
-  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(path, levels);
+  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(location, levels);
   return found;
 }
 
@@ -106,7 +103,8 @@ std::vector<FoundScene> SceneFolders::scan() {
       now.beside = files_beside(path);
       now.changed = time_of(path, now.beside);
       try {
-        now.scene = look_at_scene(path, look_);
+        now.scene = look_at_scene(locate_scene(path), look_);
+        now.scene.changed = now.changed;
         now.good = true;
       } catch (
           const std::exception& error) {  // it may be half copied: its next change is read again

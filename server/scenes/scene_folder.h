@@ -15,7 +15,7 @@ namespace catgs {
 
 /// A scene as described by its headers.
 struct FoundScene {
-  std::filesystem::path path;
+  SceneLocation location;
   std::string name;  // for people
   std::string id;
   SceneSize size;
@@ -23,8 +23,7 @@ struct FoundScene {
   /// Modification time of the file, or of the newest one that it has beside it or directly in its
   /// folder. A new value means a new scene.
   std::filesystem::file_time_type changed;
-  bool has_levels = false;  // of detail, of which a coarser one may be loaded
-  std::string tree{};       // tree_name(), for a scene that may get one; else empty
+  std::string tree{};  // tree_name(), for a scene that may get one; else empty
 };
 
 /// What is read of scenes that are found.
@@ -34,8 +33,8 @@ struct SceneLook {
   bool names_trees = false;
 };
 
-/// Reads the headers of the scene at a path. Throws InputError.
-FoundScene look_at_scene(const std::filesystem::path& path, const SceneLook& look);
+/// Reads the headers of a scene; `changed` is left to the caller. Throws InputError.
+FoundScene look_at_scene(const SceneLocation& location, const SceneLook& look);
 
 /// Scans folders for scenes repeatedly. Only headers of new and changed scenes are read, because a
 /// folder may be a slow mount of an object store. Not thread-safe.

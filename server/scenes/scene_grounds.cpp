@@ -109,7 +109,7 @@ std::string SceneGrounds::kept_or_computed(const std::string& scene_id,
       if (cancelled_) throw Cancelled();
     });
     if (bytes.size() > max_file_bytes)
-      throw NoGround(InputError(source.spec, "", "has too much ground for pages"));
+      throw NoGround(InputError(source.scene.given.string(), "", "has too much ground for pages"));
     log_info({.event = "ground_found", .scene = scene_id},
              "scene {}: its ground was found in {:.1f} s and takes {} kB", scene_id,
              std::chrono::duration<double>(Clock::now() - begin).count(), bytes.size() / 1000);

@@ -78,8 +78,8 @@ std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
 
 GroundSource ground_source_of(const SceneBook& book, const SceneTrees& trees,
                               const ServerConfig& config) {
-  GroundSource source = ground_source(book.found.path.string(), book.entry->facts);
-  if (is_synthetic(source.spec)) return source;
+  GroundSource source = ground_source(book.found.location, book.entry->facts);
+  if (source.scene.format == nullptr) return source;  // procedural
   if (trees.ready(book.found)) source.tree = trees.form_of(book.found)->tree;
   source.levels = chosen_levels(config);
   source.beside = book.entry->sidecar;
@@ -126,13 +126,12 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
 
 /// A bad scene is an operator's mistake that should stop the server.
 void SceneLibrary::pin_scenes() {
-  check_scenes(config_);
   std::set<std::string> keys;
-  for (const std::string& spec : config_.scenes) {
-    if (!keys.insert(scene_key(spec)).second) continue;  // given twice
+  for (const SceneLocation& scene : locate_scenes(config_)) {
+    if (!keys.insert(scene_key(scene.given.string())).second) continue;  // given twice
     FoundScene found;
-    found.path = spec;
-    if (trees_.enabled() && !is_synthetic(spec)) found = look_at_scene(spec, look_);
+    found.location = scene;
+    if (trees_.enabled() && scene.format != nullptr) found = look_at_scene(scene, look_);
     auto entry = load_now(found);
     const std::string id = entry->facts.scene_id;
     residency_.pin(id, need_of(*entry));
@@ -199,11 +198,11 @@ SceneLibrary::~SceneLibrary() {
 }
 
 std::shared_ptr<const SceneEntry> SceneLibrary::load_now(const FoundScene& found) {
-  const std::string spec = found.path.string();
+  const std::string spec = found.location.given.string();
   const auto load_as = [&](const SceneForm& form) {
     return load_scene(
-        spec, form, [&](const std::string& name) { return look_.ids.id_of(spec, name); }, config_,
-        core_, core_.pool->threads());
+        found.location, form, [&](const auto& name) { return look_.ids.id_of(spec, name); },
+        config_, core_, core_.pool->threads());
   };
   try {
     if (trees_.ready(found)) return load_as(*trees_.form_of(found));
@@ -353,7 +352,7 @@ LoadedScene SceneLibrary::load(const FoundScene& found, const SceneForm& form) c
     // Half of the processors stay free for the visitors' frames.
     const int threads = std::max(1, core_.pool->threads() / 2);
     return {load_scene(
-        found.path.string(), form, [&](const auto&) { return found.id; }, config_, core_, threads,
+        found.location, form, [&](const auto&) { return found.id; }, config_, core_, threads,
         [this](double) {
           if (stopping_) throw std::runtime_error("the server stops");
         })};

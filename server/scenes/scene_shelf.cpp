@@ -45,7 +45,7 @@ void SceneShelf::merge(std::vector<FoundScene> found,
     if (book.pinned || book.told || !by_name_.at(name).empty()) continue;
     book.told = true;
     log_info({.event = "scene_named", .scene = id}, "scene {} is {}, one of several called \"{}\"",
-             id, book.found.path.string(), name);
+             id, book.found.location.given.string(), name);
   }
   // Scenes in memory are released first, once they are unused.
   std::erase_if(books_, [&](const auto& of) {

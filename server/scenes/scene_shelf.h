@@ -34,7 +34,7 @@ struct SceneListing {
 
 /// What the server knows of a scene that it offers.
 struct SceneBook {
-  FoundScene found;  // of procedural scenes, only path, name and size are set
+  FoundScene found;  // of procedural scenes, only location.given, name and size are set
   std::shared_ptr<const SceneEntry> entry;      // while in memory
   std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
   std::shared_ptr<const std::string> poster{};  // stays when the entry goes

@@ -69,7 +69,7 @@ std::optional<SceneForm> SceneTrees::form_of(const FoundScene& scene) const {
   if (ready(scene)) {
     form.tree = cache_->path_of(scene.tree);
   } else if (needs_one(scene)) {
-    if (!scene.has_levels) return std::nullopt;
+    if (!scene.location.has_levels()) return std::nullopt;
     form.most_gaussians = tree_memory(config_) / GaussianCloud::bytes(1, scene.size.sh_degree);
   }
   return form;
@@ -112,7 +112,7 @@ void SceneTrees::start_next() {
   changed_ = true;
   log_info({.event = "tree_building", .scene = running_->scene.id},
            "scene {}: building its tree from {}", running_->scene.id,
-           running_->scene.path.string());
+           running_->scene.location.given.string());
   boost::asio::post(*builder_, [this, running = running_] {
     run_in_background();
     std::string error;
@@ -133,17 +133,17 @@ void SceneTrees::start_next() {
 
 void SceneTrees::build(const FoundScene& scene, const std::function<void(double)>& progress) const {
   TreeBuild build;
-  build.scene = scene.path;
+  build.scene = scene.location;
   build.out = cache_->path_of(scene.tree);
-  if (scene.has_levels) build.levels = chosen_levels(config_);
+  if (scene.location.has_levels()) build.levels = chosen_levels(config_);
   // A quarter of the memory for scenes.
   build.memory_bytes = std::clamp(tree_memory(config_) / 2, least_build_bytes, most_build_bytes);
   build.threads = threads_;
   build_scene_tree(build, progress);
-  if (tree_name(scene.path, build.levels) == scene.tree) return;
+  if (tree_name(scene.location, build.levels) == scene.tree) return;
   std::error_code error;
   std::filesystem::remove(build.out, error);
-  throw InputError(scene.path.string(), {}, "changed while its tree was built");
+  throw InputError(scene.location.given.string(), {}, "changed while its tree was built");
 }
 
 void SceneTrees::build_now(const FoundScene& scene) {

@@ -9,7 +9,7 @@
 namespace catgs {
 
 struct TreeBuild {
-  std::filesystem::path scene;
+  SceneLocation scene;
   LoadOptions levels;         // of a scene that has some; only `lod` and `gaussian_budget` count
   std::filesystem::path out;  // appears when it is whole
   std::size_t memory_bytes = 0;

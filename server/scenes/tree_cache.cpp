@@ -12,7 +12,6 @@
 #include <fmt/ranges.h>
 
 #include "render_core/base/error.h"
-#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/tree/tree_file.h"
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
@@ -78,43 +77,39 @@ struct Content {
   }
 };
 
-/// A sidecar may be saved at any time, and is read when the scene is loaded. Tilesets may have any
-/// names, so that all .json of a folder of tiles count.
+/// A sidecar may be saved at any time, and is read when the scene is loaded.
 Content content_of(const SceneLocation& scene) {
   Content content;
-  // The folder of an .lcc2 may hold other scenes.
-  const bool is_lcc2 = scene.kind == SceneLocation::Kind::lcc2;
-  if (is_lcc2 || !fs::is_directory(scene.path)) {
-    const fs::path file = is_lcc2 ? scene.path / scene.index : scene.path;
-    content.add(file);
-    for (const fs::path& other : files_beside(file)) content.add(other);
+  // A folder without an index of its format may hold other scenes.
+  if (scene.files.index.empty() || scene.files.index != scene.format->index) {
+    content.add(scene.files.first());
+    for (const fs::path& other : files_beside(scene.files.first())) content.add(other);
     return content;
   }
-  const bool all = scene.kind == SceneLocation::Kind::tiles_folder;
-  for (const auto& entry : fs::recursive_directory_iterator(scene.path))
+  for (const auto& entry : fs::recursive_directory_iterator(scene.files.path))
     if (entry.is_regular_file() &&
-        (all || entry.path().extension() != ".json" || is_scene_index(entry.path())))
+        (scene.format->json_is_data || entry.path().extension() != ".json" ||
+         is_scene_index(entry.path())))
       content.add(entry.path());
   return content;
 }
 
 }  // namespace
 
-std::string tree_name(const fs::path& scene, const LoadOptions& levels) {
-  const SceneLocation location = locate_scene(scene);
-  const std::optional<SplatModel> model = model_in_sidecar(location.hints);
+std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
+  const std::optional<SplatModel> model = model_in_sidecar(scene.hints);
   try {
-    const Content content = content_of(location);
+    const Content content = content_of(scene);
     const std::string facts =
-        fmt::format("{}\n{} {} {}\n{} {}\n{} {}", location.path.string(), content.files,
+        fmt::format("{}\n{} {} {}\n{} {}\n{} {}", scene.files.path.string(), content.files,
                     content.bytes, content.newest.time_since_epoch().count(),
                     levels.lod.value_or(-1), levels.gaussian_budget.value_or(0),
                     TreeHeader::right_version, model ? name_of(*model) : "");
-    return fmt::format("{}-{}-{}{}", plain(location.name),
-                       hex_digest(scene_key(scene.string()), path_digits / 2),
+    return fmt::format("{}-{}-{}{}", plain(scene.name),
+                       hex_digest(scene_key(scene.given.string()), path_digits / 2),
                        hex_digest(facts, content_digits / 2), extension);
   } catch (const fs::filesystem_error& error) {
-    throw InputError(scene.string(), {}, "cannot be read: " + error.code().message());
+    throw InputError(scene.given.string(), {}, "cannot be read: " + error.code().message());
   }
 }
 

@@ -14,7 +14,7 @@ namespace catgs {
 /// is of the scene's path. The second one changes with its files (path, number, sizes, newest
 /// time), with the levels that are chosen of it, and with the format of trees. Sidecars do not
 /// count. Reads the names, sizes and times of the scene's files. Throws InputError.
-std::string tree_name(const std::filesystem::path& scene, const LoadOptions& levels);
+std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 
 /// The trees in a folder. Files of other names are left alone. Not thread-safe.
 class TreeCache {

@@ -73,10 +73,10 @@ void check_pictures(const std::string& scene, RunReport& report) {
   config.scenes = {scene};
   RendererOptions core;
   core.pool = std::make_shared<ThreadPool>(0);
-  check_scenes(config);
   const SceneIds ids(config.scenes, {});
   const auto entry = load_scene(
-      scene, {}, [&](const std::string& name) { return ids.id_of(scene, name); }, config, core,
+      locate_scenes(config).front(), {},
+      [&](const std::string& name) { return ids.id_of(scene, name); }, config, core,
       core.pool->threads());
   const auto view = entry->renderer->make_view({Pipeline::exact, PixelFormat::rgb_f32});
   for (GroupReport& group : report.groups) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/scene.h"
 
 namespace catgs {
@@ -22,12 +23,9 @@ struct LoadOptions {
   int threads = 0;                                // 0: one per processor
 };
 
-/// Reads any supported scene. It may be a file: .ply (original and compressed), .splat, .ksplat,
-/// .spz, .sog, .ssog, .glb, .gltf, .lcc2 or .tree. It may be a folder of 3D Tiles, or a streamed or
-/// unpacked SOG folder (or its tileset.json, lod-meta.json, meta.json), a training output folder
-/// (its newest iteration), or a folder with a single scene file. The content of a file decides its
-/// format before its name does. Throws InputError; the error for an unknown format lists the
-/// supported ones. Memory peaks at the cloud and a few bytes per Gaussian.
+/// Reads a scene. Throws InputError. Memory peaks at the cloud and a few bytes per Gaussian.
+Scene load_scene(const SceneLocation& location, const LoadOptions& options = {});
+/// The same for a path that locate_scene() resolves.
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});
 
 /// A scene in pages, of which renderers read what they need.
@@ -36,9 +34,10 @@ struct SceneInPages {
   Scene outline;  // its cloud is a coarse level, for hints and analysis; `report` is of all
 };
 
-/// Opens a .tree file. `made_of`: the scene that it was made of, if it shall have that one's name
-/// and hints. Throws InputError, also for other formats.
-SceneInPages open_in_pages(const std::filesystem::path& path, const LoadOptions& options = {},
-                           const std::filesystem::path& made_of = {});
+/// Opens a scene of a format that is read in pages. Throws InputError, also for other formats.
+SceneInPages open_in_pages(const SceneLocation& location, const LoadOptions& options = {});
+/// Opens the .tree file that was made of a scene, with the scene's name and hints.
+SceneInPages open_in_pages(const std::filesystem::path& tree, const SceneLocation& made_of,
+                           const LoadOptions& options);
 
 }  // namespace catgs

@@ -1,7 +1,6 @@
 #include "render_core/scene/files/locate_scene.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <functional>
 #include <optional>
@@ -11,9 +10,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
-#include "render_core/scene/formats/byte_source.h"
-#include "render_core/scene/formats/gltf.h"
-#include "render_core/scene/formats/lcc2.h"
+#include "render_core/scene/files/scene_formats.h"
 
 namespace catgs {
 
@@ -22,12 +19,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view iteration_prefix = "iteration_";
-
-/// Files that stand for their folders. Where a folder has several, the first one counts.
-constexpr std::array<std::pair<std::string_view, SceneLocation::Kind>, 3> indices = {
-    {{"lod-meta.json", SceneLocation::Kind::streamed_sog_folder},
-     {"tileset.json", SceneLocation::Kind::tiles_folder},
-     {"meta.json", SceneLocation::Kind::sog_folder}}};
 
 std::optional<std::uint64_t> iteration_number(const fs::path& folder) {
   const std::string name = folder.filename().string();
@@ -60,6 +51,10 @@ std::optional<fs::path> training_of(const fs::path& file) {
   return clouds.parent_path();
 }
 
+const SceneFormat* format_named(const fs::path& file) {
+  return format_with(file.extension().string());
+}
+
 /// The only scene file directly in the folder.
 fs::path single_scene_file(const fs::path& folder) {
   std::vector<std::string> found;
@@ -67,14 +62,10 @@ fs::path single_scene_file(const fs::path& folder) {
     if (is_scene_name(entry.path()) && entry.is_regular_file())
       found.push_back(entry.path().filename().string());
   }
-  if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes);
-  // The .sog or .spz files beside an .lcc2 are its parts.
-  const auto is_index = [](const std::string& name) { return name.ends_with(".lcc2"); };
+  if (found.empty()) throw InputError(folder.string(), "", "holds no scene", supported_scenes());
+  const auto is_index = [](const std::string& name) { return format_named(name)->names_folder; };
   if (std::ranges::any_of(found, is_index)) std::erase_if(found, std::not_fn(is_index));
-  // A .glb or .gltf beside a scene is a mesh, most likely.
-  const auto may_be_mesh = [](const std::string& name) {
-    return name.ends_with(".glb") || name.ends_with(".gltf");
-  };
+  const auto may_be_mesh = [](const std::string& name) { return format_named(name)->may_be_mesh; };
   if (!std::ranges::all_of(found, may_be_mesh)) std::erase_if(found, may_be_mesh);
   std::sort(found.begin(), found.end());
   if (found.size() > 1)
@@ -88,21 +79,20 @@ fs::path single_scene_file(const fs::path& folder) {
   return folder / found.front();
 }
 
-SceneLocation at_folder(SceneLocation::Kind kind, const fs::path& folder) {
+SceneLocation at_folder(const SceneFormat& format, const fs::path& folder, std::string index) {
   SceneLocation location;
-  location.kind = kind;
-  location.path = folder;
+  location.format = &format;
+  location.files = {folder, std::move(index)};
   location.name = folder.filename().string();
   location.hints.sidecar = folder.parent_path() / (location.name + ".json");
   return location;
 }
 
-/// Exporters call the file of a scene meta.lcc2, or as the scene is called.
-SceneLocation at_lcc2(const fs::path& file) {
+/// Exporters call such a file "meta", as in meta.lcc2, or as the scene is called.
+SceneLocation at_folder_of(const SceneFormat& format, const fs::path& file) {
   std::error_code error;
   const fs::path folder = fs::absolute(file, error).lexically_normal().parent_path();
-  SceneLocation location = at_folder(SceneLocation::Kind::lcc2, folder);
-  location.index = file.filename().string();
+  SceneLocation location = at_folder(format, folder, file.filename().string());
   if (file.stem() == "meta") return location;
   location.name = file.stem().string();
   location.hints.sidecar = sidecar_of(file);
@@ -110,10 +100,11 @@ SceneLocation at_lcc2(const fs::path& file) {
 }
 
 SceneLocation at_file(const fs::path& file) {
-  if (file.extension() == ".lcc2") return at_lcc2(file);
+  const SceneFormat& format = format_of(file);
+  if (format.names_folder) return at_folder_of(format, file);
   SceneLocation location;
-  if (file.extension() == ".ssog") location.kind = SceneLocation::Kind::streamed_sog_archive;
-  location.path = file;
+  location.format = &format;
+  location.files.path = file;
   const auto training = training_of(file);
   const fs::path folder = training.value_or(file.parent_path());
   location.name = training ? training->filename().string() : file.stem().string();
@@ -123,32 +114,16 @@ SceneLocation at_file(const fs::path& file) {
   return location;
 }
 
-}  // namespace
-
-bool is_scene_name(const fs::path& path) {
-  constexpr std::array extensions = {".ply",  ".splat", ".ksplat", ".spz",  ".sog",
-                                     ".ssog", ".glb",   ".gltf",   ".lcc2", ".tree"};
-  return std::find(extensions.begin(), extensions.end(), path.extension().string()) !=
-         extensions.end();
-}
-
-bool is_scene_index(const fs::path& file) {
-  return std::ranges::any_of(indices,
-                             [&](const auto& index) { return file.filename() == index.first; });
-}
-
-bool has_scene_index(const fs::path& folder) {
+/// The format whose index a folder has; null: none.
+const SceneFormat* format_of_folder(const fs::path& folder) {
   std::error_code error;
-  if (std::ranges::any_of(
-          indices, [&](const auto& index) { return fs::exists(folder / index.first, error); }))
-    return true;
-  fs::directory_iterator entries(folder, error);
-  return std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
-    return entry.path().extension() == ".lcc2";
+  const auto found = std::ranges::find_if(scene_formats(), [&](const SceneFormat* format) {
+    return !format->index.empty() && fs::exists(folder / format->index, error);
   });
+  return found == scene_formats().end() ? nullptr : *found;
 }
 
-SceneLocation locate_scene(const fs::path& given) {
+SceneLocation locate(const fs::path& given) {
   std::error_code error;
   fs::path path = fs::absolute(given, error).lexically_normal();  // so that "." has a name
   if (!path.has_filename()) path = path.parent_path();
@@ -160,8 +135,8 @@ SceneLocation locate_scene(const fs::path& given) {
   if (is_scene_index(path)) path = path.parent_path();
   if (!fs::is_directory(path, error)) return at_file(given);
 
-  for (const auto& [name, kind] : indices)
-    if (fs::exists(path / name, error)) return at_folder(kind, path);
+  if (const SceneFormat* format = format_of_folder(path))
+    return at_folder(*format, path, std::string(format->index));
   if (const auto ply = newest_iteration(path)) {
     SceneLocation location = at_file(*ply);
     location.hints.sidecar = path.parent_path() / (location.name + ".json");
@@ -170,13 +145,38 @@ SceneLocation locate_scene(const fs::path& given) {
   return at_file(single_scene_file(path));
 }
 
+}  // namespace
+
+bool is_scene_name(const fs::path& path) { return format_named(path) != nullptr; }
+
+bool is_scene_index(const fs::path& file) {
+  return std::ranges::any_of(scene_formats(), [&](const SceneFormat* format) {
+    return !format->index.empty() && file.filename() == format->index;
+  });
+}
+
+bool has_scene_index(const fs::path& folder) {
+  if (format_of_folder(folder) != nullptr) return true;
+  std::error_code error;
+  fs::directory_iterator entries(folder, error);
+  return std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+    const SceneFormat* format = format_named(entry.path());
+    return format != nullptr && format->names_folder;
+  });
+}
+
+SceneLocation locate_scene(const fs::path& given) {
+  SceneLocation location = locate(given);
+  location.given = given;
+  return location;
+}
+
 std::vector<fs::path> files_beside(const fs::path& scene) {
   std::vector<fs::path> files;
-  const bool is_gltf = scene.extension() == ".gltf", is_lcc2 = scene.extension() == ".lcc2";
-  if (!is_gltf && !is_lcc2) return files;
+  const SceneFormat* format = format_named(scene);
+  if (format == nullptr || !format->files_beside) return files;
   try {
-    const FileSource file(scene);
-    for (const std::string& name : is_gltf ? gltf_buffer_files(file) : lcc2_files(file))
+    for (const std::string& name : format->files_beside(FileSource(scene)))
       files.push_back(scene.parent_path() / name);
   } catch (const InputError&) {
   }

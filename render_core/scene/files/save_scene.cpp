@@ -1,61 +1,46 @@
 #include "render_core/scene/files/save_scene.h"
 
 #include <cassert>
-#include <functional>
-#include <ostream>
 #include <string>
-#include <string_view>
 
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
-#include "render_core/scene/formats/gltf.h"
-#include "render_core/scene/formats/ply.h"
-#include "render_core/scene/formats/sog.h"
-#include "render_core/scene/formats/splat.h"
-#include "render_core/scene/formats/spz.h"
+#include "render_core/scene/files/scene_formats.h"
 
 namespace catgs {
 
 namespace {
 
-constexpr std::string_view remedy = "use .ply, .splat, .spz, .sog, .glb or .tree";
-
-using Writer = std::function<void(const GaussianCloud&, std::ostream&)>;
-
-Writer writer_for(const std::filesystem::path& path, int threads = 0) {
+/// The format that is written to a file of this name. Throws InputError.
+const SceneFormat& format_to_write(const std::filesystem::path& path) {
+  const std::string remedy = "use " + written_extensions();
   if (path.string().ends_with(".compressed.ply"))
     throw InputError(path.string(), "", "compressed PLY is only read, not written", remedy);
   const std::string extension = path.extension().string();
-  if (extension == ".ply") return write_ply;
-  if (extension == ".splat") return write_splat;
-  if (extension == ".spz") return write_spz;
-  if (extension == ".glb") return write_glb;
-  if (extension == ".sog")
-    return [threads](const GaussianCloud& cloud, std::ostream& to) {
-      ThreadPool pool(threads);
-      write_sog(cloud, pool, to);
-    };
+  const SceneFormat* format = format_with(extension);
+  if (format != nullptr && format->write && format->extensions[0] == extension) return *format;
   throw InputError(path.string(), "", "cannot be written: unknown extension '" + extension + "'",
                    remedy);
 }
 
 }  // namespace
 
-void check_can_be_saved(const std::filesystem::path& path) { writer_for(path); }
+void check_can_be_saved(const std::filesystem::path& path) { format_to_write(path); }
 
 bool keeps_model(const std::filesystem::path& path, SplatModel model) {
-  const std::string extension = path.extension().string();
   if (model == SplatModel::standard) return true;
-  if (extension == ".spz") return model == SplatModel::antialiased;
-  return extension == ".ply" || extension == ".sog" || extension == ".tree";
+  const SceneFormat* format = format_with(path.extension().string());
+  if (format == nullptr) return false;
+  return model == SplatModel::antialiased ? format->keeps_antialiased : format->keeps_surfels;
 }
 
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads) {
   assert(cloud.sizes_agree());
-  const Writer write = writer_for(path, threads);
+  const SceneFormat& format = format_to_write(path);
+  ThreadPool pool(threads);
   PartFile file(path);
   try {
-    write(cloud, file.stream());
+    format.write(cloud, pool, file.stream());
   } catch (const InputError& e) {  // the writers do not know the file's name
     throw InputError(path.string(), "", e.what());
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,13 +21,12 @@ struct PartedScene {
   std::vector<std::string> notes;  // as Scene::notes
 };
 
-/// The scene at `path` if its format can be read in parts: a binary 3DGS .ply, a .splat, or a scene
-/// of several levels, of which each file of the finest is a part. It may have
+/// The scene at a location if its format can be read in parts: a binary 3DGS .ply, a .splat, or a
+/// scene of several levels, of which each file of the finest is a part. It may have
 /// TreeShape::max_gaussians. Throws InputError when such a scene is wrong. Of
 /// `options`, `up` and `model` count; `part_rows`: Gaussians of a file's part before faulty ones
 /// are dropped.
-std::optional<PartedScene> scene_in_parts(const std::filesystem::path& path,
-                                          const LoadOptions& options,
+std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const LoadOptions& options,
                                           const std::shared_ptr<ThreadPool>& pool,
                                           std::uint64_t part_rows = 1'000'000,
                                           bool wants_hints = true);

@@ -35,6 +35,13 @@ std::vector<std::byte> ByteSource::read_all(std::uint64_t limit) const {
   return bytes;
 }
 
+bool begins_with(const ByteSource& file, std::string_view bytes) {
+  if (file.size() < bytes.size()) return false;
+  std::string start(bytes.size(), '\0');
+  file.read(0, std::as_writable_bytes(std::span(start)));
+  return start == bytes;
+}
+
 std::vector<std::byte> read_rows(const ByteSource& file, std::uint64_t offset,
                                  std::size_t row_bytes, const FileRows& rows, std::size_t begin,
                                  std::size_t end) {

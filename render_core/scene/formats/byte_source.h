@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -42,6 +43,9 @@ class ByteSource {
   std::string name_;
   std::uint64_t size_;
 };
+
+/// Whether the first bytes of a file are these.
+bool begins_with(const ByteSource& file, std::string_view bytes);
 
 /// Some rows of a file of rows: `first`, `first + step` and so on, `count` of them.
 struct FileRows {

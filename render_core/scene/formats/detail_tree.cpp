@@ -129,6 +129,7 @@ DetailChoice choose_detail(const DetailTree& tree, const std::string& file,
 }
 
 GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context) {
+  if (scene.read_all) return scene.read_all(context);
   if (scene.parts == 1) return scene.read(0, context);
   GaussianCloud whole;
   whole.resize(scene.count, scene.sh_degree);

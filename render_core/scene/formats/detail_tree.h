@@ -57,6 +57,8 @@ struct OpenLevels {
   /// The Gaussians of a part with the SH degree of the whole, not sanitized. Keeps what it reads
   /// from. Throws InputError.
   std::function<GaussianCloud(std::size_t part, const LoadContext&)> read;
+  /// All parts, if the format can read them at once; else null.
+  std::function<GaussianCloud(const LoadContext&)> read_all{};
 };
 
 /// All parts, one after the other. The model is that of the largest part.

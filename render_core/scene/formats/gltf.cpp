@@ -18,6 +18,7 @@
 #include "render_core/scene/directions.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/transform.h"
 
@@ -118,8 +119,8 @@ Part parse_spz_part(GltfDocument& document, const JsonField& spz, const JsonFiel
                     Contents& contents) {
   Part part;
   part.spz = document.view(spz.at("bufferView"));
-  const SpzSize size = read_spz_size(SliceSource(*part.spz.file, part.spz.offset, part.spz.size));
-  part.count = size.count;
+  const SceneSize size = read_spz_size(SliceSource(*part.spz.file, part.spz.offset, part.spz.size));
+  part.count = size.gaussians;
   part.sh_degree = std::min(size.sh_degree, max_sh_degree);
   for (std::string& note : notes_of_degree(size.sh_degree)) contents.note(std::move(note));
   if (const auto space = extension.find("colorSpace"))
@@ -370,5 +371,26 @@ GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadCont
   }
   return result;
 }
+
+constexpr SceneFormat gltf_format = {
+    .name = "glTF",
+    .extensions = {".glb", ".gltf"},
+    .may_be_mesh = true,
+    .is_mine = [](const ByteSource& file,
+                  std::string_view extension) { return is_glb(file) || extension == ".gltf"; },
+    .files_beside = gltf_buffer_files,
+    .size = [](const SceneFiles& files) -> SceneSize {
+      const GltfSize size =
+          read_gltf_size(FileSource(files.path), FolderFiles(files.path.parent_path()));
+      return {size.count, size.sh_degree};
+    },
+    .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
+      GltfFile gltf =
+          read_gltf(FileSource(files.path), FolderFiles(files.path.parent_path()), context);
+      return {"glTF", std::move(gltf.cloud), std::move(gltf.notes)};
+    },
+    .write = [](const GaussianCloud& cloud, ThreadPool&,
+                std::ostream& to) { write_glb(cloud, to); },
+};
 
 }  // namespace catgs

@@ -14,6 +14,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // glTF 2.0 with KHR_gaussian_splatting, as text (.gltf) or binary (.glb). Scales and opacities are
 // stored as plain values. glTF's axes are left, up, front; GaussianCloud's are right, down, front,
 // half a turn about z away.
@@ -58,5 +60,7 @@ AffineMap affine_map(const JsonField& matrix);
 /// Writes a .glb with floats: what read_gltf() reads from it is the same, bit for bit. Throws
 /// InputError when the file would exceed the 4 GiB of the format.
 void write_glb(const GaussianCloud& cloud, std::ostream& to);
+
+extern const SceneFormat gltf_format;
 
 }  // namespace catgs

@@ -232,7 +232,7 @@ struct RowReader {
 
 }  // namespace
 
-KsplatSize read_ksplat_size(const ByteSource& file) {
+SceneSize read_ksplat_size(const ByteSource& file) {
   const Layout layout = read_layout(file);
   return {layout.header.count, layout.sh_degree};
 }
@@ -259,5 +259,15 @@ GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context) {
   }
   return cloud;
 }
+
+constexpr SceneFormat ksplat_format = {
+    .name = "ksplat",
+    .extensions = {".ksplat"},
+    .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".ksplat"; },
+    .size = [](const SceneFiles& files) { return read_ksplat_size(FileSource(files.path)); },
+    .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
+      return {"ksplat", read_ksplat(FileSource(files.path), context)};
+    },
+};
 
 }  // namespace catgs

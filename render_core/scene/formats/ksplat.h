@@ -1,9 +1,8 @@
 #pragma once
 
-#include <cstdint>
-
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -14,14 +13,12 @@ namespace catgs {
 // Colour and opacity are bytes at every level. The format has no mark at its start and is told by
 // its name.
 
-struct KsplatSize {
-  std::uint64_t count = 0;
-  int sh_degree = 0;
-};
 /// From the headers alone. Throws InputError as read_ksplat() does.
-KsplatSize read_ksplat_size(const ByteSource& file);
+SceneSize read_ksplat_size(const ByteSource& file);
 
 /// Not sanitized. Throws InputError naming the field.
 GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context);
+
+extern const SceneFormat ksplat_format;
 
 }  // namespace catgs

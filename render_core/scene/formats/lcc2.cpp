@@ -12,6 +12,7 @@
 #include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/formats/axes.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/keep_if.h"
@@ -147,8 +148,8 @@ Part open_part(const FileSet& files, const Index& scene, std::size_t file) {
   part.is_spz = scene.is_spz;
   const auto source = files.open(part.name);
   if (scene.is_spz) {
-    const SpzSize size = read_spz_size(*source);
-    part.held = size.count;
+    const SceneSize size = read_spz_size(*source);
+    part.held = size.gaussians;
     part.file_degree = size.sh_degree;
   } else {
     SogMeta meta = parse_sog_meta(ZipFiles(*source, meta_name), meta_name);
@@ -261,5 +262,14 @@ OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::st
   };
   return scene;
 }
+
+constexpr SceneFormat lcc2_format = {
+    .name = "LCC2",
+    .extensions = {".lcc2"},
+    .names_folder = true,
+    .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".lcc2"; },
+    .files_beside = lcc2_files,
+    .open_levels = open_lcc2,
+};
 
 }  // namespace catgs

@@ -13,6 +13,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // LCC2 of XGRIDS (white paper of version 0.0.3): a JSON file, NAME.lcc2, with a tree of regions.
 // Each node below the root is a range of the Gaussians of a .sog or .spz file, and its children
 // show the same in more detail. The root may name a file of surroundings, which every level has.
@@ -28,5 +30,7 @@ std::vector<std::string> lcc2_files(const ByteSource& file);
 OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::string& index,
                      std::optional<int> level, std::optional<std::size_t> budget,
                      std::uint64_t most = max_gaussians);
+
+extern const SceneFormat lcc2_format;
 
 }  // namespace catgs

@@ -6,15 +6,20 @@
 #include <charconv>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/transform.h"
 
 namespace catgs {
@@ -314,5 +319,63 @@ void write_ply(const GaussianCloud& cloud, std::ostream& to) {
              static_cast<std::streamsize>((end - begin) * row_floats * sizeof(float)));
   }
 }
+
+namespace {
+
+SceneSize size_of_ply(const SceneFiles& files) {
+  const FileSource file(files.path);
+  const PlyHeader header = read_ply_header(file);
+  const PlyElement* vertex = header.find("vertex");
+  if (!vertex) throw InputError(file.name(), "element vertex", "is missing");
+  require_count(file, "element vertex", vertex->count);
+  if (header.encoding != PlyEncoding::ascii && !vertex->has_list)
+    require_rows_in_file(file, *vertex);
+  const PlyElement* sh = is_compressed_ply(header) ? header.find("sh") : vertex;
+  if (!sh) return {vertex->count, 0};
+  return {vertex->count, std::max(0, sh_degree_of_rest(sh->rest_count() / 3))};
+}
+
+std::vector<std::string> notes_of(const PlyElement& vertex) {
+  return notes_of_degree(sh_degree_of_rest(vertex.rest_count() / 3));
+}
+
+DecodedScene read_any_ply(const SceneFiles& files, const LoadContext& context) {
+  const FileSource file(files.path);
+  const PlyHeader header = read_ply_header(file);
+  if (is_compressed_ply(header))
+    return {"compressed ply", read_compressed_ply(file, header, context)};
+  GaussianCloud cloud = read_ply(file, header, context);
+  return {"3DGS ply", std::move(cloud), notes_of(*header.find("vertex"))};
+}
+
+std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t part_rows,
+                                         std::uint64_t most, const LoadContext& context) {
+  const auto file = std::make_shared<const FileSource>(files.path);
+  const auto header = std::make_shared<const PlyHeader>(read_ply_header(*file));
+  const PlyElement* vertex = header->find("vertex");
+  if (!vertex || header->encoding == PlyEncoding::ascii || is_compressed_ply(*header))
+    return std::nullopt;
+  require_rows_in_file(*file, *vertex, most);
+  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
+    return read_ply_rows(*file, *header, rows, reading);
+  };
+  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*vertex));
+}
+
+}  // namespace
+
+constexpr SceneFormat ply_format = {
+    .name = "PLY",
+    .extensions = {".ply"},
+    .kinds = "3DGS or compressed",
+    .keeps_antialiased = true,
+    .keeps_surfels = true,
+    .is_mine = [](const ByteSource& file, std::string_view) { return begins_with(file, "ply"); },
+    .size = size_of_ply,
+    .read = read_any_ply,
+    .read_parts = ply_in_parts,
+    .write = [](const GaussianCloud& cloud, ThreadPool&,
+                std::ostream& to) { write_ply(cloud, to); },
+};
 
 }  // namespace catgs

@@ -9,6 +9,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 /// Reads the point cloud that the original 3DGS training writes: element `vertex` with x y z,
 /// f_dc_0…2, f_rest_* (0, 9, 24, 45 or 72 of them, channel-major), opacity (logit), scale_0…2
 /// (logarithms; 2DGS has no scale_2) and rot_0…3 (w, x, y, z). Comments tell the model. Any order,
@@ -24,5 +26,8 @@ GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, con
 /// Writes the original's layout: binary little-endian, all float, zero normals. Means, unit
 /// rotations and SH are kept bit for bit, scales to 1e-6 (relative), opacities to 1e-7 (absolute).
 void write_ply(const GaussianCloud& cloud, std::ostream& to);
+
+/// This .ply, and PlayCanvas' compressed one.
+extern const SceneFormat ply_format;
 
 }  // namespace catgs

@@ -14,6 +14,7 @@
 #include "render_core/scene/activations.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/sog_image.h"
 
 namespace catgs {
@@ -303,5 +304,35 @@ SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadC
   decode_sog(files, meta, {&all, 1}, sog.cloud, context);
   return sog;
 }
+
+namespace {
+
+constexpr const char* index_name = "meta.json";
+
+SceneSize size_of_sog(const SceneFiles& files) {
+  const SogMeta meta = parse_sog_meta(*files.open(index_name), index_name);
+  return {meta.count, meta.hides_sh_degree() ? max_sh_degree : meta.sh_degree};
+}
+
+DecodedScene read_sog_scene(const SceneFiles& files, const LoadContext& context) {
+  SogFile sog = read_sog(*files.open(), index_name, context);
+  return {fmt::format("sog v{} ({})", sog.version, files.index.empty() ? "zip" : "folder"),
+          std::move(sog.cloud)};
+}
+
+}  // namespace
+
+constexpr SceneFormat sog_format = {
+    .name = "SOG",
+    .extensions = {".sog"},
+    .index = index_name,
+    .keeps_antialiased = true,
+    .keeps_surfels = true,
+    .is_mine = [](const ByteSource& file,
+                  std::string_view) { return begins_with(file, "PK\x03\x04"); },
+    .size = size_of_sog,
+    .read = read_sog_scene,
+    .write = write_sog,
+};
 
 }  // namespace catgs

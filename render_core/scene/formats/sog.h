@@ -16,6 +16,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // PlayCanvas' SOG ("spatially ordered Gaussians"): one lossless WebP image per attribute, a texel
 // per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises between
 // limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
@@ -78,4 +80,7 @@ SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadC
 /// SH above is the nearest of 256 values too, of at most 65,536 palette entries, so a larger scene
 /// shares entries. Throws InputError when there are more Gaussians than an image has room for.
 void write_sog(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to);
+
+extern const SceneFormat sog_format;
+
 }  // namespace catgs

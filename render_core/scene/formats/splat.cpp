@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <ostream>
 #include <vector>
 
@@ -9,6 +10,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/formats/scene_format.h"
 
 namespace catgs {
 
@@ -85,5 +87,34 @@ void write_splat(const GaussianCloud& cloud, std::ostream& to) {
              static_cast<std::streamsize>(rows.size() * sizeof(SplatRow)));
   }
 }
+
+namespace {
+
+std::optional<DecodedParts> splat_in_parts(const SceneFiles& files, std::uint64_t part_rows,
+                                           std::uint64_t most, const LoadContext& context) {
+  const auto file = std::make_shared<const FileSource>(files.path);
+  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
+    return read_splat_rows(*file, rows, reading);
+  };
+  return parts_of_rows("splat", count_splat(*file, most), part_rows, read, context);
+}
+
+}  // namespace
+
+constexpr SceneFormat splat_format = {
+    .name = "splat",
+    .extensions = {".splat"},
+    .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".splat"; },
+    .size =
+        [](const SceneFiles& files) {
+          return SceneSize{FileSource(files.path).size() / sizeof(SplatRow), 0};
+        },
+    .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
+      return {"splat", read_splat(FileSource(files.path), context)};
+    },
+    .read_parts = splat_in_parts,
+    .write = [](const GaussianCloud& cloud, ThreadPool&,
+                std::ostream& to) { write_splat(cloud, to); },
+};
 
 }  // namespace catgs

@@ -10,6 +10,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // The .splat format of antimatter15/splat: 32 bytes per Gaussian and nothing else. Mean and scale
 // as floats, colour and opacity as 4 bytes, the quaternion w, x, y, z as bytes around 128.
 
@@ -26,5 +28,7 @@ GaussianCloud read_splat_rows(const ByteSource& file, const FileRows& rows,
 /// Colours lose what lies outside [0, 1] and everything view-dependent. Errors: colour and opacity
 /// 0.5/255, each quaternion component 0.5/128.
 void write_splat(const GaussianCloud& cloud, std::ostream& to);
+
+extern const SceneFormat splat_format;
 
 }  // namespace catgs

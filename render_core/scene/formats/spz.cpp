@@ -324,7 +324,7 @@ bool is_spz(const ByteSource& file) {
          load_as<std::uint16_t>(start.data()) == 0x8b1f;
 }
 
-SpzSize read_spz_size(const ByteSource& file) {
+SceneSize read_spz_size(const ByteSource& file) {
   std::array<std::byte, plain_header_bytes> start;
   if (is_gzip(file))
     open_gzip(file)->read(std::span(start).first(gzip_header_bytes));
@@ -337,5 +337,20 @@ SpzSize read_spz_size(const ByteSource& file) {
 SpzFile read_spz(const ByteSource& file, const LoadContext& context, SpzAxes axes) {
   return is_gzip(file) ? read_gzip(file, context, axes) : read_plain(file, context, axes);
 }
+
+constexpr SceneFormat spz_format = {
+    .name = "SPZ",
+    .extensions = {".spz"},
+    .keeps_antialiased = true,
+    .is_mine = [](const ByteSource& file, std::string_view) { return is_spz(file); },
+    .size = [](const SceneFiles& files) { return read_spz_size(FileSource(files.path)); },
+    .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
+      SpzFile spz = read_spz(FileSource(files.path), context);
+      return {fmt::format("spz v{}", spz.version), std::move(spz.cloud),
+              notes_of_degree(spz.sh_degree), spz.orbit};
+    },
+    .write = [](const GaussianCloud& cloud, ThreadPool&,
+                std::ostream& to) { write_spz(cloud, to); },
+};
 
 }  // namespace catgs

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <iosfwd>
 #include <optional>
 #include <string>
 
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/orbit_limits.h"
 
@@ -30,11 +30,7 @@ struct SpzFile {
 bool is_spz(const ByteSource& file);
 
 /// Content of the header; the SH degree is that of the file. Throws InputError.
-struct SpzSize {
-  std::uint64_t count = 0;
-  int sh_degree = 0;
-};
-SpzSize read_spz_size(const ByteSource& file);
+SceneSize read_spz_size(const ByteSource& file);
 
 /// Axes of a cloud that was read: those of GaussianCloud, or whatever the file has. glTF and LCC2
 /// say by themselves which axes the .spz inside them have.
@@ -50,5 +46,7 @@ SpzFile read_spz(const ByteSource& file, const LoadContext& context,
 /// 1/32 and above 1/16, inside [-1, 1); quaternion components 0.5 sqrt(1/2) / 511.
 /// Throws InputError when a coordinate is over 2^23.
 void write_spz(const GaussianCloud& cloud, std::ostream& to);
+
+extern const SceneFormat spz_format;
 
 }  // namespace catgs

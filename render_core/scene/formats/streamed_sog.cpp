@@ -9,11 +9,13 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/scene_format.h"
 
 namespace catgs {
 
 namespace {
 
+constexpr const char* index_name = "lod-meta.json";
 constexpr std::uint64_t max_tree_bytes = 32 << 20;  // 6 M Gaussians take 242 KB
 constexpr std::uint64_t max_levels = 16;
 constexpr std::size_t max_files = std::size_t{1} << 16;
@@ -138,6 +140,12 @@ LodChoice choose(const LodTree& tree, std::optional<int> level, std::optional<st
                    "raise the budget");
 }
 
+/// Gaussians that a part has in the scene.
+std::size_t size_of(const StreamedSogPart& part) {
+  const SogRange& last = part.ranges.back();
+  return last.destination + last.count - part.ranges.front().destination;
+}
+
 }  // namespace
 
 LodTree read_lod_tree(const ByteSource& file) {
@@ -203,7 +211,7 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
 
 std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget) {
-  const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const LodTree tree = read_lod_tree(*folder.open(index_name));
   const std::size_t environment =
       tree.environment.empty() ? 0 : open_part(folder, tree.environment).meta.count;
   return choose(tree, level, budget, environment).count + environment;
@@ -211,7 +219,7 @@ std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
 
 OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> level,
                                   std::optional<std::size_t> budget, std::uint64_t most) {
-  const LodTree tree = read_lod_tree(*folder.open("lod-meta.json"));
+  const LodTree tree = read_lod_tree(*folder.open(index_name));
   const UnsharedFiles files(folder, tree.name);
   std::vector<StreamedSogPart> environment;
   if (!tree.environment.empty()) environment.push_back(open_part(files, tree.environment));
@@ -228,7 +236,7 @@ OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> leve
     scene.count += part.meta.count;
     scene.parts.push_back(std::move(part));
   }
-  require_plausible_count(*folder.open("lod-meta.json"), "tree", scene.count, sog_least_bytes,
+  require_plausible_count(*folder.open(index_name), "tree", scene.count, sog_least_bytes,
                           files.bytes(), most);
   for (const StreamedSogPart& part : scene.parts)
     scene.sh_degree = std::max(scene.sh_degree, part.meta.sh_degree);
@@ -245,24 +253,68 @@ GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSo
   const std::size_t first = alone.ranges.front().destination;
   for (SogRange& range : alone.ranges) range.destination -= first;
   GaussianCloud cloud;
-  cloud.resize(alone.ranges.back().destination + alone.ranges.back().count, scene.sh_degree);
+  cloud.resize(size_of(alone), scene.sh_degree);
   decode_part(folder, alone, cloud, context);
   return cloud;
 }
 
-StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
-                              std::optional<std::size_t> budget, const LoadContext& context) {
-  const OpenStreamedSog scene = open_streamed_sog(folder, level, budget);
-  StreamedSog result{scene.detail, {}};
-  result.cloud.resize(scene.count, scene.sh_degree);
+GaussianCloud read_streamed_sog(const FileSet& folder, const OpenStreamedSog& scene,
+                                const LoadContext& context) {
+  GaussianCloud cloud;
+  cloud.resize(scene.count, scene.sh_degree);
   const auto total = static_cast<double>(scene.count);
   std::size_t done = 0;
   for (const StreamedSogPart& part : scene.parts) {
     const double from = static_cast<double>(done) / total;
     for (const SogRange& range : part.ranges) done += range.count;
-    decode_part(folder, part, result.cloud, context.part(from, static_cast<double>(done) / total));
+    decode_part(folder, part, cloud, context.part(from, static_cast<double>(done) / total));
   }
-  return result;
+  cloud.model = std::ranges::max_element(scene.parts, {}, size_of)->meta.model;
+  return cloud;
 }
+
+namespace {
+
+OpenLevels open_levels(const std::shared_ptr<const FileSet>& files, const std::string& /*index*/,
+                       std::optional<int> level, std::optional<std::size_t> budget,
+                       std::uint64_t most) {
+  const auto sog =
+      std::make_shared<const OpenStreamedSog>(open_streamed_sog(*files, level, budget, most));
+  OpenLevels scene;
+  scene.format = fmt::format("streamed sog ({})", sog->detail);
+  scene.levels = sog->levels;
+  scene.sh_degree = sog->sh_degree;
+  scene.count = sog->count;
+  scene.parts = sog->parts.size();
+  scene.read = [files, sog](std::size_t part, const LoadContext& context) {
+    return read_streamed_sog_part(*files, *sog, part, context);
+  };
+  scene.read_all = [files, sog](const LoadContext& context) {
+    return read_streamed_sog(*files, *sog, context);
+  };
+  return scene;
+}
+
+/// An archive is unpacked as a whole only where its environment counts, too.
+std::size_t count_chosen(const SceneFiles& files, std::optional<int> level,
+                         std::optional<std::size_t> budget) {
+  if (files.index.empty()) {
+    const auto tree = files.open(index_name);
+    if (read_lod_tree(*tree->open(index_name)).environment.empty())
+      return count_streamed_sog(*tree, level, budget);
+  }
+  return count_streamed_sog(*files.open(), level, budget);
+}
+
+}  // namespace
+
+constexpr SceneFormat streamed_sog_format = {
+    .name = "streamed SOG",
+    .extensions = {".ssog"},
+    .index = index_name,
+    .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".ssog"; },
+    .open_levels = open_levels,
+    .count = count_chosen,
+};
 
 }  // namespace catgs

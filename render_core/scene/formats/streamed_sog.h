@@ -14,6 +14,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // PlayCanvas' streamed SOG: a folder of SOGs and lod-meta.json, a tree whose nodes hold the same
 // part of the scene at several levels of detail. We load one level per node, once.
 
@@ -51,7 +53,7 @@ LodChoice choose_level(const LodTree& tree, int level);
 /// finer level, cheapest first. Empty when not even the coarsest level fits.
 std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t budget);
 
-/// Number of Gaussians that `level` or `budget` select (see read_streamed_sog), the environment
+/// Number of Gaussians that `level` or `budget` select (see open_streamed_sog), the environment
 /// included. Reads lod-meta.json and the environment's meta data only. Throws InputError.
 std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget);
@@ -85,13 +87,10 @@ OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> leve
 GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSog& scene,
                                      std::size_t part, const LoadContext& context);
 
-struct StreamedSog {
-  std::string detail;   // as OpenStreamedSog::detail
-  GaussianCloud cloud;  // not sanitized
-};
+/// All parts, not sanitized. Throws InputError.
+GaussianCloud read_streamed_sog(const FileSet& folder, const OpenStreamedSog& scene,
+                                const LoadContext& context);
 
-/// Loads all parts of what open_streamed_sog() opens. Throws InputError.
-StreamedSog read_streamed_sog(const FileSet& folder, std::optional<int> level,
-                              std::optional<std::size_t> budget, const LoadContext& context);
+extern const SceneFormat streamed_sog_format;
 
 }  // namespace catgs

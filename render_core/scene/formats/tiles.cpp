@@ -19,6 +19,7 @@
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/gltf_document.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/transform.h"
 
 namespace catgs {
@@ -286,5 +287,12 @@ OpenLevels open_tiles(const std::shared_ptr<const FileSet>& folder, const std::s
   };
   return scene;
 }
+
+constexpr SceneFormat tiles_format = {
+    .name = "3D Tiles",
+    .index = "tileset.json",
+    .json_is_data = true,
+    .open_levels = open_tiles,
+};
 
 }  // namespace catgs

@@ -12,6 +12,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 // 3D Tiles 1.0 and 1.1 (OGC 22-025r4): tileset.json, a tree of tiles whose contents are glTF files
 // with Gaussians, or further tilesets. Implicit tiling and the tile formats of version 1.0 (.b3dm,
 // .pnts and others) are not read.
@@ -32,5 +34,7 @@ namespace catgs {
 OpenLevels open_tiles(const std::shared_ptr<const FileSet>& folder, const std::string& index,
                       std::optional<int> level, std::optional<std::size_t> budget,
                       std::uint64_t most = max_gaussians);
+
+extern const SceneFormat tiles_format;
 
 }  // namespace catgs

@@ -10,6 +10,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/format_limits.h"
+#include "render_core/scene/formats/scene_format.h"
 
 namespace catgs {
 namespace {
@@ -121,5 +122,22 @@ TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& c
                      "give --detail, so that only what a picture needs is in memory");
   return read_tree(tree, max_gaussians, context);
 }
+
+constexpr SceneFormat tree_format = {
+    .name = "tree",
+    .extensions = {".tree"},
+    .in_pages = true,
+    .keeps_antialiased = true,
+    .keeps_surfels = true,
+    .is_mine = [](const ByteSource& file, std::string_view) { return is_tree(file); },
+    .size = [](const SceneFiles& files) -> SceneSize {
+      const TreeHeader header = read_tree_header(FileSource(files.path));
+      return {header.gaussians, static_cast<int>(header.sh_degree), true};
+    },
+    .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
+      TreeScene tree = read_tree(std::make_unique<FileSource>(files.path), context);
+      return {"tree", std::move(tree.cloud), std::move(tree.notes)};
+    },
+};
 
 }  // namespace catgs

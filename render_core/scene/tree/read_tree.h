@@ -12,6 +12,8 @@
 
 namespace catgs {
 
+struct SceneFormat;
+
 /// Throws InputError if the root's page is damaged or missing: nothing can be seen without it.
 void require_root(TreeFile& tree);
 
@@ -31,5 +33,7 @@ TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& c
 /// The same for the finest level with at most `most_gaussians` that ends a page, or that of the
 /// root's page: an outline of a scene of any size.
 TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadContext& context);
+
+extern const SceneFormat tree_format;
 
 }  // namespace catgs

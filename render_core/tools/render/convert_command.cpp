@@ -12,6 +12,7 @@
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/media_name.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/files/scene_formats.h"
 #include "render_core/scene/files/scene_parts.h"
 #include "render_core/scene/files/tour_places.h"
 #include "render_core/scene/formats/load_context.h"
@@ -37,7 +38,7 @@ struct ConvertOptions {
 struct Conversion {
   const ConvertOptions& options;
   SceneEdit edit;
-  HintFiles hint_files;  // of the scene that is read
+  SceneLocation in;
 };
 
 /// Copies the files that tours can show. Those that are there stay. Throws InputError.
@@ -76,22 +77,21 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
     fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
     return;
   }
-  nlohmann::ordered_json tours = tours_in_sidecar(conversion.hint_files);
+  nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
   if (placement.moves()) place_tours(tours, placement);
   write_sidecar(placement.moves() ? placed(hints, placement) : hints, sidecar, &tours);
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
-  if (!tours.is_null()) copy_media(conversion.hint_files.sidecar, sidecar);
+  if (!tours.is_null()) copy_media(conversion.in.hints.sidecar, sidecar);
 }
 
 /// Before the scene is loaded, which may take minutes.
 Conversion check(const ConvertOptions& options) {
-  const SceneLocation in = locate_scene(options.in.path);
-  const Conversion conversion{options, edit_of(options.edit), in.hints};
+  const Conversion conversion{options, edit_of(options.edit), locate_scene(options.in.path)};
   if (!is_tree_name(options.out)) check_can_be_saved(options.out);
   std::error_code error;
-  for (const std::filesystem::path& path : {std::filesystem::path(options.in.path), in.path})
+  for (const std::filesystem::path& path : {conversion.in.given, conversion.in.files.path})
     if (std::filesystem::equivalent(path, options.out, error))
       throw InputError(options.out, "", "is the scene that is read",
                        "give the output another name");
@@ -139,7 +139,7 @@ bool convert_in_parts(const Conversion& conversion, bool quiet) {
   LoadOptions load;
   load.up = up_of(options.in);
   load.model = model_of(options.in);
-  const auto scene = scene_in_parts(options.in.path, load, pool);
+  const auto scene = scene_in_parts(conversion.in, load, pool);
   if (!scene) return false;
   EditCounts counts;
   write_tree(edited(scene->parts, conversion.edit, pool, counts), options.tree, options.out, *pool,
@@ -174,7 +174,7 @@ void convert(const ConvertOptions& options, bool quiet) {
   const Conversion conversion = check(options);
   if (convert_in_parts(conversion, quiet)) return;
   constexpr bool first_view = false;  // would be estimated anew from the file that is written
-  Scene scene = load_scene(options.in, options.threads, quiet, first_view);
+  Scene scene = load_scene(conversion.in, options.in, options.threads, quiet, first_view);
   const EditCounts counts = edit_whole(scene.cloud, conversion, quiet);
   save(scene, options, quiet);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
@@ -195,11 +195,10 @@ void convert(const ConvertOptions& options, bool quiet) {
 
 void add_convert_command(CLI::App& app) {
   auto options = std::make_shared<ConvertOptions>();
-  CLI::App* command =
-      app.add_subcommand("convert", "Converts a scene to .ply, .splat, .spz, .sog, .glb or .tree");
+  const std::string extensions = written_extensions();
+  CLI::App* command = app.add_subcommand("convert", "Converts a scene to " + extensions);
   add_scene_options(*command, options->in, "in");
-  command->add_option("out", options->out, "File to write: .ply, .splat, .spz, .sog, .glb or .tree")
-      ->required();
+  command->add_option("out", options->out, "File to write: " + extensions)->required();
   command->add_option("--threads", options->threads, "Number of threads; 0: one per processor")
       ->capture_default_str();
   add_tree_options(*command, options->tree);

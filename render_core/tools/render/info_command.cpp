@@ -148,28 +148,21 @@ void print_text(const Json& info) {
                                 info["load_ms"].get<double>(), 1e-6 * peak, peak / bytes));
 }
 
-/// The header of the tree at a place, if there is one.
-std::optional<TreeHeader> tree_at(const SceneLocation& location) {
-  if (location.kind != SceneLocation::Kind::file) return std::nullopt;
-  if (!is_tree(FileSource(location.path))) return std::nullopt;
-  TreeFile tree(std::make_unique<FileSource>(location.path));
-  require_root(tree);
-  return tree.header();
-}
-
 void info(const InfoOptions& options, bool quiet) {
   const SceneLocation location = locate_scene(options.scene.path);
   std::vector<std::string> notes;
   if (auto mistake = mistake_in_tours(location.hints)) notes.push_back(*std::move(mistake));
-  if (const auto tree = tree_at(location)) {
-    Json description = describe_tree(location.path, *tree);
+  if (location.is_in_pages()) {
+    TreeFile tree(std::make_unique<FileSource>(location.files.path));
+    require_root(tree);
+    Json description = describe_tree(location.files.path, tree.header());
     description["notes"] = notes;
     if (options.json) return write_json("-", description);
     print_tree(description);
     return print_notes(description);
   }
   const auto start = std::chrono::steady_clock::now();
-  Scene scene = load_scene(options.scene, options.threads, quiet);
+  Scene scene = load_scene(location, options.scene, options.threads, quiet);
   const std::chrono::duration<double, std::milli> load_ms =
       std::chrono::steady_clock::now() - start;
   scene.notes.insert(scene.notes.end(), notes.begin(), notes.end());

@@ -14,7 +14,6 @@
 #include "render_core/scene/files/scene_by_parts.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/progress.h"
-#include "render_core/tools/render/tree_output.h"
 #include "render_core/tools/scene_options.h"
 #include "render_core/tools/walk/plan_files.h"
 #include "render_core/walk/eye_height.h"
@@ -34,17 +33,18 @@ struct FloorsOptions {
 
 SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<ThreadPool>& pool,
                         bool quiet) {
-  if (is_tree_name(options.scene.path))
-    return by_parts(open_in_pages(options.scene, options.threads, quiet), pool);
+  const SceneLocation location = locate_scene(options.scene.path);
+  if (location.is_in_pages())
+    return by_parts(open_in_pages(location, options.scene, options.threads, quiet), pool);
   LoadOptions load;
   load.up = up_of(options.scene);
   load.model = model_of(options.scene);
   // A start that is estimated from a sample may lie beyond the walls.
   if (!options.scene.lod && !options.scene.budget)
-    if (auto scene = scene_in_parts(options.scene.path, load, pool);
+    if (auto scene = scene_in_parts(location, load, pool);
         scene && scene->hints.source != "estimated")
       return by_parts(*std::move(scene));
-  return by_parts(load_scene(options.scene, options.threads, quiet));
+  return by_parts(load_scene(location, options.scene, options.threads, quiet));
 }
 
 float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {

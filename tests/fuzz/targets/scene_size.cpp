@@ -28,7 +28,7 @@ GaussianCloud read(Bytes input) {
 void parse_scene_size(Bytes input) {
   static FileInMemory file;
   file.rewrite(input);
-  const SceneSize size = read_scene_size(file.path(), {});
+  const SceneSize size = read_scene_size(locate_scene(file.path()), {});
   require(size.gaussians > 0 && size.gaussians <= 1 << 28, "scenes have Gaussians, and an end");
   require(size.sh_degree >= 0 && size.sh_degree <= 3, "degrees are those that there are");
   GaussianCloud cloud;

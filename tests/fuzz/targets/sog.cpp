@@ -87,7 +87,8 @@ void parse_streamed_sog(Bytes input) {
   for (const std::optional<std::size_t> budget : {std::optional<std::size_t>(), {20}}) try {
       const std::size_t count = count_streamed_sog(files, {}, budget);
       require(!budget || count <= *budget, "a budget is kept");
-      const GaussianCloud cloud = read_streamed_sog(files, {}, budget, one_thread()).cloud;
+      const GaussianCloud cloud =
+          read_streamed_sog(files, open_streamed_sog(files, {}, budget), one_thread());
       require(cloud.size() == count, "as many are read as were counted");
       require_sound(cloud);
       read = true;

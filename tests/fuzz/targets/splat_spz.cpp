@@ -45,9 +45,9 @@ void parse_ksplat(Bytes input) {
   for (std::uint32_t i = 0; i < std::min(sections, 8u); ++i) bytes += take(ksplat_section_bytes);
   bytes += text_of(input);
   const MemorySource file("input", bytes_of(bytes));
-  const KsplatSize size = read_ksplat_size(file);
+  const SceneSize size = read_ksplat_size(file);
   const GaussianCloud cloud = read_ksplat(file, one_thread());
-  require(cloud.size() == size.count && cloud.sh_degree == size.sh_degree,
+  require(cloud.size() == size.gaussians && cloud.sh_degree == size.sh_degree,
           "as many are read as were announced");
   require_sound(cloud);
 }

@@ -14,7 +14,7 @@
 namespace catgs {
 namespace {
 
-TEST(MortonOrder, HoldsEveryGaussianOnceAndNeighboursTogether) {
+TEST(MortonOrder, EveryGaussianIsListedOnceAndBesideItsNeighbours) {
   ThreadPool pool(2);
   const GaussianCloud cloud = test::random_cloud(20'000, 0, 1);
   const std::vector<std::uint32_t> order = morton_order(cloud.mean, pool);
@@ -48,7 +48,7 @@ TEST(MortonOrder, EqualPlacesKeepTheirOrder) {
   EXPECT_TRUE(morton_order({}, pool).empty());
 }
 
-TEST(ClusterBounds, HoldWhatIsAdded) {
+TEST(ClusterBounds, BoundsHoldAddedGaussians) {
   const GaussianCloud cloud = test::random_cloud(256, 0, 3);
   ClusterBounds bounds;
   double farthest = 0.0;
@@ -70,7 +70,7 @@ TEST(ClusterBounds, HoldWhatIsAdded) {
   EXPECT_LE(cluster.reach, farthest * (1.0 + 1e-5));
 }
 
-TEST(ClusterBounds, WhatNobodySeesReachesNothing) {
+TEST(ClusterBounds, InvisibleGaussiansHaveNoReach) {
   ClusterBounds bounds;
   bounds.add({1, 2, 3}, 5.0, std::log2(0.003f));  // fainter than 1/255
   EXPECT_EQ(bounds.cluster().reach, 0.0f);
@@ -78,7 +78,7 @@ TEST(ClusterBounds, WhatNobodySeesReachesNothing) {
 
 // A cluster that goes from the left of the image to its right is outside at both ends and inside in
 // between.
-TEST(ClusterCuller, OnTheWayIsNotOutsideAtBothEnds) {
+TEST(ClusterCuller, ClustersCrossedOnTheWayAreKept) {
   const auto camera = [](float x) {
     return make_camera({{x, 0, 0}, glm::quat(1, 0, 0, 0)}, {100, 100}, 50.0f);
   };
@@ -93,7 +93,7 @@ TEST(ClusterCuller, OnTheWayIsNotOutsideAtBothEnds) {
   EXPECT_FALSE(outside_on_the_way(middle, right, cluster));
 }
 
-TEST(ColoursHold, UntilTheDirectionToTheNearestHasTurned) {
+TEST(ColoursHold, ColoursHoldUntilTheNearestDirectionTurns) {
   const Cluster cluster{{0, 0, 10}, {1, 1, 2}, 5.0f};  // nearest mean 8 away from the origin
   const glm::vec3 here(0.0f);
   const auto step = static_cast<float>(8.0 * colour_reuse_rad);

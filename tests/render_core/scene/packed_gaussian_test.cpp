@@ -90,7 +90,7 @@ void expect_close(const GaussianCloud& cloud) {
   }
 }
 
-TEST(PackedGaussian, IsWithinRoundingInEveryDegree) {
+TEST(PackedGaussian, ValuesAreWithinRoundingInEveryDegree) {
   for (int degree = 0; degree <= max_sh_degree; ++degree) {
     SCOPED_TRACE(degree);
     for (const std::size_t count : {1, 31, 77, 256})
@@ -111,7 +111,7 @@ TEST(PackedGaussian, FaintOnesStayFaint) {
   EXPECT_NEAR(reach(3), 7.994f, 1e-3f);
 }
 
-TEST(PackedGaussian, TakesAtMost80Bytes) {
+TEST(PackedGaussian, GaussiansTakeAtMost80Bytes) {
   const auto bytes = [](int degree) {
     return static_cast<double>(packed_block_bytes(degree) + sizeof(PackedUnits) + sizeof(Cluster)) /
            static_cast<double>(cluster_size);
@@ -134,7 +134,7 @@ TEST(PackedGaussian, PlanesCoverTheBlockOnce) {
 }
 
 // A grain beside a mountain keeps its shape, and so do clusters that are all tiny.
-TEST(PackedGaussian, KeepsShapesOfAllSizes) {
+TEST(PackedGaussian, ShapesOfAllSizesAreKept) {
   GaussianCloud cloud = catgs::test::random_cloud(256, 0, 1);
   for (const float largest : {1.0f, 1e6f}) {
     SCOPED_TRACE(largest);
@@ -148,7 +148,7 @@ TEST(PackedGaussian, KeepsShapesOfAllSizes) {
 
 // The ends of a needle 100000 times as long as thick stay where they are: within 2^-13 of its
 // length.
-TEST(PackedGaussian, KeepsTheDirectionOfNeedles) {
+TEST(PackedGaussian, NeedlesKeepTheirDirection) {
   GaussianCloud cloud = catgs::test::random_cloud(256, 0, 2);
   for (glm::vec3& scale : cloud.scale) scale = {1.0f, 1e-5f, 1e-5f};
   const PackedScene scene(cloud);
@@ -175,7 +175,7 @@ TEST(PackedGaussian, HarmonicsOfOneColourNeedNoRange) {
 }
 
 // Rounding must not shift a scene's colour: errors cancel.
-TEST(PackedGaussian, RoundsHarmonicsWithoutBias) {
+TEST(PackedGaussian, HarmonicsAreRoundedWithoutBias) {
   const GaussianCloud cloud = catgs::test::random_cloud(256, 3, 4);
   const PackedScene scene(cloud);
   double error = 0.0, magnitude = 0.0;
@@ -211,7 +211,7 @@ TEST(PackedGaussian, BoundsHoldForWhatIsPacked) {
 
 // Needles, flakes and balls. The factor of a flake that a world axis crosses at right angles is not
 // unique within rounding, its covariance is.
-TEST(PackedGaussian, UnpacksToTheGaussiansOfTheRecords) {
+TEST(PackedGaussian, RecordsAreUnpackedToTheirGaussians) {
   for (const int degree : {0, 3}) {
     SCOPED_TRACE(degree);
     GaussianCloud cloud = catgs::test::random_cloud(200, degree, 12);

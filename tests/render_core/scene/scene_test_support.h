@@ -52,6 +52,27 @@ inline std::string input_error(const std::function<void()>& call) {
   return {};
 }
 
+/// The input that an error refuses, without the words for people.
+struct Refusal {
+  std::string source, where;
+
+  bool operator==(const Refusal&) const = default;
+};
+inline void PrintTo(const Refusal& refusal, std::ostream* out) {
+  *out << "{\"" << refusal.source << "\", \"" << refusal.where << "\"}";
+}
+
+/// What the InputError names that `call` throws; fails the test when it throws none.
+inline Refusal refusal_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const InputError& e) {
+    return {e.source(), e.where()};
+  }
+  ADD_FAILURE() << "no InputError was thrown";
+  return {};
+}
+
 /// What a lossy format may change, per field. 0 means bit for bit.
 struct Tolerance {
   float mean = 0.0f;       // world units

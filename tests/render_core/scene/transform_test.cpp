@@ -40,7 +40,7 @@ void expect_equal_but_for_rounding(const glm::dmat3& a, const glm::dmat3& b, dou
 
 class Transform : public ::testing::TestWithParam<glm::dmat3> {};
 
-TEST_P(Transform, MovesMeansAndCovariancesByTheMap) {
+TEST_P(Transform, MeansAndCovariancesFollowTheMap) {
   const AffineMap map{GetParam(), {1.0, -2.0, 3.0}};
   const GaussianCloud before = random_cloud(200, 0), after = transformed(before, map);
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -96,7 +96,7 @@ TEST(CloudTransformTest, VeryFlatGaussiansStayFlat) {
     EXPECT_NEAR(double{s.x} * s.y * s.z, volume, 1e-5 * volume);
 }
 
-TEST(CloudTransformTest, WhatIsNoNumberStaysForTheSanitizer) {
+TEST(CloudTransformTest, NonFiniteValuesAreLeftToTheSanitizer) {
   GaussianCloud cloud = random_cloud(3, 1);
   cloud.rotation[0] = glm::quat(0.0f, 0.0f, 0.0f, 0.0f);
   cloud.rotation[1].x = std::nanf("");
@@ -107,7 +107,7 @@ TEST(CloudTransformTest, WhatIsNoNumberStaysForTheSanitizer) {
   for (int k = 0; k < 3; ++k) EXPECT_LT(after.scale[2][k], 1e-20f);
 }
 
-TEST(AffineMapTest, IsUsableWhereItHasAnInverse) {
+TEST(AffineMapTest, InvertibleMapsAreUsable) {
   EXPECT_TRUE((AffineMap{1e-6 * stretch, {1e9, 0, 0}}).usable());
   EXPECT_FALSE((AffineMap{glm::dmat3(1, 0, 0, 2, 0, 0, 0, 0, 1), {}}).usable());
   EXPECT_FALSE((AffineMap{glm::dmat3(0.0), {}}).usable());

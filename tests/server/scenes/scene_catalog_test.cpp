@@ -41,9 +41,9 @@ class SceneCatalog : public FolderTest {
     config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
   }
   std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneForm& form = {}) {
-    check_scenes(config_);
     return load_scene(
-        config_.scenes.at(scene), form, [](const std::string& name) { return name; }, config_,
+        locate_scenes(config_).at(scene), form, [](const std::string& name) { return name; },
+        config_,
         {.kind = RendererKind::cpu,
          .pool = std::make_shared<ThreadPool>(2),
          .pages = std::make_shared<PagePools>(tree_memory(config_))},

@@ -102,7 +102,7 @@ TEST_F(SceneFolderTest, FindsFoldersWithLevels) {
   write("lcc/0.spz", encode_spz(random_cloud(20, 0), {.version = 4}));
   EXPECT_THAT(names(), ElementsAre("lcc", "tiles"));
   EXPECT_EQ(folders_.scan()[0].size.gaussians, 20u);
-  EXPECT_TRUE(folders_.scan()[1].has_levels);
+  EXPECT_TRUE(folders_.scan()[1].location.has_levels());
 }
 
 TEST_F(SceneFolderTest, LeavesOutWhatCannotBeReadUntilItChanges) {

@@ -271,9 +271,10 @@ TEST(GroundOfScene, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
   const TemporaryFolder folder;
   const auto error = [&](int gaussians) {
     GroundSource source;
-    source.spec = folder.write("a.ply", fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n"
-                                                    "property float x\nend_header\n",
-                                                    gaussians));
+    source.scene =
+        locate_scene(folder.write("a.ply", fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n"
+                                                       "property float x\nend_header\n",
+                                                       gaussians)));
     return input_error([&] { compute_ground(source, 2, [] {}); });
   };
   EXPECT_THAT(error(4'000'001), ::testing::HasSubstr("--cache-dir"));
@@ -283,7 +284,7 @@ TEST(GroundOfScene, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
 /// The public demo: its ground is found without its file.
 TEST(GroundOfScene, OfAProceduralScene) {
   GroundSource source;
-  source.spec = "synth:stress:100000";
+  source.scene.given = "synth:stress:100000";
   source.start = {0, -1.6f, -5};
   source.up = {0, -1, 0};
   source.metres_per_unit = 1.0f;

@@ -370,7 +370,7 @@ TEST_F(SceneTreesTest, AFolderThatCannotBeUsedIsNamed) {
 
 TEST_F(SceneTreesTest, AFailedBuildIsNotTriedAgainSoon) {
   // In the place of the tree.
-  write("trees/" + tree_name(folder_ / "scenes/a.ply", {}) + "/file", "");
+  write("trees/" + tree_name(locate_scene(folder_ / "scenes/a.ply"), {}) + "/file", "");
   start();
   const Entry whole = load("a");
   run_until([&] { return failed() == 1; });

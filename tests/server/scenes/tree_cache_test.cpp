@@ -20,7 +20,7 @@ using ::testing::MatchesRegex;
 class TreeCacheTest : public FolderTest {
  protected:
   std::string name_of(const std::string& scene, const LoadOptions& levels = {}) {
-    return tree_name(folder_ / scene, levels);
+    return tree_name(locate_scene(folder_ / scene), levels);
   }
   void age(const fs::path& file, std::chrono::hours by) {
     fs::last_write_time(file, fs::last_write_time(file) - by);

@@ -7,7 +7,7 @@
 namespace catgs::test {
 namespace {
 
-TEST(RobustBounds, IgnoreWhatEscapedAndWhatIsTransparent) {
+TEST(RobustBounds, OutliersAndTransparentGaussiansAreIgnored) {
   GaussianCloud cloud = room();
   for (std::size_t i = 0; i < 1000; ++i) cloud.mean[i] = glm::vec3(500.0f, 0.0f, 0.0f);
   for (std::size_t i = 1000; i < 20000; ++i) {

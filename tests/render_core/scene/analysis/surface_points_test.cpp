@@ -30,7 +30,7 @@ void add_wall(GaussianCloud& cloud, int side, float z, float opacity) {
 constexpr glm::vec3 ahead(0.0f, 0.0f, 1.0f);
 ThreadPool pool(2);
 
-TEST(SurfacePoints, FindsTheFirstThingThatStopsHalfOfTheLight) {
+TEST(SurfacePoints, FirstSurfaceThatStopsHalfOfTheLightIsFound) {
   GaussianCloud cloud;
   add_wall(cloud, 20, 2.0f, 0.01f);  // a haze
   add_wall(cloud, 20, 5.0f, 0.9f);
@@ -44,7 +44,7 @@ TEST(SurfacePoints, FindsTheFirstThingThatStopsHalfOfTheLight) {
 }
 
 // Ten thin veils of the same opacity, a unit from the first to the last.
-TEST(SurfacePoints, TellsHowDeepTheLightGoes) {
+TEST(SurfacePoints, DepthOfTheLightIsReported) {
   GaussianCloud cloud;
   for (int i = 0; i < 10; ++i) add_wall(cloud, 20, 5.0f + static_cast<float>(i) / 9.0f, 0.05f);
   const auto hit = SurfacePoints(cloud, pool).hit_along(glm::vec3(0.1f, 0.0f, 0.0f), ahead);
@@ -53,7 +53,7 @@ TEST(SurfacePoints, TellsHowDeepTheLightGoes) {
   EXPECT_LT(hit->spread, 0.5f);
 }
 
-TEST(SurfacePoints, SaysWhereNothingIs) {
+TEST(SurfacePoints, EmptyDirectionsHaveNoHit) {
   GaussianCloud cloud;
   add_wall(cloud, 20, 5.0f, 0.9f);
   const SurfacePoints surface(cloud, pool);
@@ -62,7 +62,7 @@ TEST(SurfacePoints, SaysWhereNothingIs) {
   EXPECT_FALSE(SurfacePoints(GaussianCloud{}, pool).hit_along(glm::vec3(0.0f), ahead));
 }
 
-TEST(SurfacePoints, FindsTheSameInASampleOfALargeScene) {
+TEST(SurfacePoints, SamplesOfLargeScenesGiveTheSamePoint) {
   GaussianCloud cloud;
   add_wall(cloud, 100, 5.0f, 0.9f);
   const SurfacePoints sample(cloud, pool, 500);
@@ -92,7 +92,7 @@ std::optional<float> brute_force(const GaussianCloud& cloud, const glm::dvec3& o
   return std::nullopt;
 }
 
-TEST(SurfacePoints, LooksWhereverTheRayPasses) {
+TEST(SurfacePoints, HitsAreThoseOfBruteForce) {
   GaussianCloud cloud = test::random_cloud(20'000, 0, 1);
   for (std::size_t i = 0; i < cloud.size(); ++i)
     cloud.scale[i] = glm::vec3(i % 1000 == 0 ? 0.3f : 0.02f);

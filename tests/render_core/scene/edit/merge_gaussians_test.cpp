@@ -46,7 +46,7 @@ Moments moments_of(const GaussianCloud& cloud) {
   return sums;
 }
 
-TEST(MergeGaussians, KeepsTotalMomentsAndMakesAsManyAsWanted) {
+TEST(MergeGaussians, TotalMomentsAndTheWantedCountAreKept) {
   GaussianCloud cloud = random_cloud(3000, 2);
   for (std::size_t i = 0; i < cloud.size(); ++i) {  // neither end of the range of opacities is met
     cloud.mean[i] *= 0.05f;
@@ -72,19 +72,19 @@ TEST(MergeGaussians, KeepsTotalMomentsAndMakesAsManyAsWanted) {
   }
 }
 
-TEST(MergeGaussians, TheSameForAnyNumberOfThreads) {
+TEST(MergeGaussians, ResultsAreTheSameForAnyNumberOfThreads) {
   const GaussianCloud cloud = random_cloud(20'000, 1);
   const GaussianCloud one = merged(cloud, 5000, 1), three = merged(cloud, 5000, 3);
   EXPECT_EQ(ply_bytes(one), ply_bytes(three));
 }
 
-TEST(MergeGaussians, LeavesFewerGaussiansAlone) {
+TEST(MergeGaussians, FewerGaussiansAreLeftAlone) {
   const GaussianCloud cloud = random_cloud(10, 1);
   EXPECT_EQ(ply_bytes(merged(cloud, 10)), ply_bytes(cloud));
   EXPECT_EQ(ply_bytes(merged(cloud, 11)), ply_bytes(cloud));
 }
 
-TEST(MergeGaussians, JoinsWhatNoPictureTellsApart) {
+TEST(MergeGaussians, IndistinguishableGaussiansAreMerged) {
   GaussianCloud cloud = random_cloud(200, 0);
   cloud.resize(400, 0);
   for (std::size_t i = 0; i < 200; ++i) {
@@ -102,7 +102,7 @@ TEST(MergeGaussians, JoinsWhatNoPictureTellsApart) {
   }
 }
 
-TEST(MergeGaussians, EndsWithWhateverTheValuesAre) {
+TEST(MergeGaussians, MergingEndsForAnyValues) {
   GaussianCloud cloud = random_cloud(500, 0);
   for (std::size_t i = 0; i < 500; ++i) {
     cloud.mean[i] *= i % 3 == 0 ? 1e8f : 0.0f;
@@ -128,7 +128,7 @@ GaussianCloud wall() {
   return cloud;
 }
 
-TEST(MergeGaussians, BeatsDropping) {
+TEST(MergeGaussians, MergingBeatsDropping) {
   const auto pool = std::make_shared<ThreadPool>(2);
   const auto draw = [&](const GaussianCloud& cloud) {
     const auto view =

@@ -19,7 +19,7 @@ void add_ball(GaussianCloud& cloud, const glm::vec3& mean, float size, float opa
   cloud.opacity.back() = opacity;
 }
 
-TEST(RemoveFloaters, TakesWhatFloatsAndLeavesTheSurfaces) {
+TEST(RemoveFloaters, FloatersGoAndSurfacesStay) {
   const GaussianCloud walls = room();
   GaussianCloud cloud = walls;
   // In the room, beyond it and far away; a clump of several; mist that nobody sees.
@@ -33,14 +33,14 @@ TEST(RemoveFloaters, TakesWhatFloatsAndLeavesTheSurfaces) {
   EXPECT_EQ(ply_bytes(cloud), ply_bytes(walls));
 }
 
-TEST(RemoveFloaters, LeavesWhatHangsTogetherWithASurface) {
+TEST(RemoveFloaters, GaussiansConnectedToASurfaceStay) {
   GaussianCloud cloud = room();
   for (int i = 0; i < 100; ++i)  // a cord from the ceiling
     add_ball(cloud, {0.0f, -1.5f + 0.01f * static_cast<float>(i), 0.0f}, 0.005f);
   EXPECT_EQ(removed_from(cloud), 0u);
 }
 
-TEST(RemoveFloaters, LeavesABackgroundFarAway) {
+TEST(RemoveFloaters, FarBackgroundsStay) {
   GaussianCloud cloud = room();
   const std::size_t count = cloud.size();
   GaussianCloud sky = ball(1.0f);
@@ -50,7 +50,7 @@ TEST(RemoveFloaters, LeavesABackgroundFarAway) {
   EXPECT_EQ(cloud.size(), count + 4000);
 }
 
-TEST(RemoveFloaters, NeverDropsTheScene) {
+TEST(RemoveFloaters, ScenesAreNeverDropped) {
   GaussianCloud one;
   add_ball(one, {5.0f, 5.0f, 5.0f}, 0.1f);
   EXPECT_EQ(removed_from(one), 0u);
@@ -62,7 +62,7 @@ TEST(RemoveFloaters, NeverDropsTheScene) {
   EXPECT_EQ(removed_from(none), 0u);
 }
 
-TEST(RemoveFloaters, TheSameForAnyNumberOfThreads) {
+TEST(RemoveFloaters, ResultsAreTheSameForAnyNumberOfThreads) {
   GaussianCloud one = random_cloud(20'000, 1), three = one;
   EXPECT_EQ(removed_from(one, 1), removed_from(three, 3));
   EXPECT_EQ(ply_bytes(one), ply_bytes(three));

@@ -46,15 +46,13 @@ TEST(Sidecar, FieldsAreRead) {
   EXPECT_FALSE(parse_sidecar("{}").up);
 }
 
-TEST(Sidecar, NamesTheModel) {
+TEST(Sidecar, ModelsAreRead) {
   EXPECT_EQ(parse_sidecar(R"({"model": "2dgs"})").model, SplatModel::surfels);
   EXPECT_EQ(parse_sidecar(R"({"model": "antialiased"})").model, SplatModel::antialiased);
   EXPECT_EQ(parse_sidecar("{}").model, std::nullopt);
-  EXPECT_THAT(input_error([] { parse_sidecar(R"({"model": "3dgs"})"); }),
-              AllOf(HasSubstr("model"), HasSubstr("antialiased")));
 }
 
-TEST(Sidecar, SaysWhatVisitorsAreTold) {
+TEST(Sidecar, TextsForVisitorsAreRead) {
   const SceneAbout about = parse_sidecar(R"({
     "title": "The hall", "credits": "Ada\u202e", "licence": "CC-BY-4.0", "mode": "walk",
     "background": "#0a10FF", "metres_per_unit": 0.25})")
@@ -70,33 +68,38 @@ TEST(Sidecar, SaysWhatVisitorsAreTold) {
 }
 
 TEST(Sidecar, ErrorsNameTheField) {
-  const auto error = [](const char* text) { return input_error([&] { parse_sidecar(text); }); };
-  EXPECT_THAT(error(R"({"title": 1})"), HasSubstr("title: is not a text"));
-  EXPECT_THAT(error(fmt::format(R"({{"credits": "{}"}})", std::string(801, 'a')).c_str()),
-              HasSubstr("credits: has more than 800 bytes"));
-  EXPECT_THAT(error(R"({"mode": "swim"})"), AllOf(HasSubstr("mode:"), HasSubstr("orbit, fly")));
+  struct Text {
+    std::string text;
+    const char* where;
+  };
+  const std::string pose = R"({"start_pose": {"position": [0, 0, 0])";
+  std::vector<Text> texts = {
+      {R"({"title": 1})", "title"},
+      {R"({"credits": ")" + std::string(801, 'a') + "\"}", "credits"},
+      {R"({"mode": "swim"})", "mode"},
+      {R"({"model": "3dgs"})", "model"},
+      {R"({"up": )", "byte 8"},
+      {"[]", ""},
+      {R"({"up": "w"})", "up"},
+      {R"({"up": [0, 0, 0]})", "up"},
+      {R"({"near": 0})", "near"},
+      {R"({"near": 1.1e9})", "near"},
+      {R"({"focus": [0, -1.1e9, 0]})", "focus"},
+      {R"({"near": 1e99})", "near"},
+      {R"({"focus": [1, 2, "c"]})", "focus[2]"},
+      {R"({"limits": {"min": [0, 0, 0], "max": [1, 0, 1]}})", "limits"},
+      {pose + "}}", "start_pose"},
+      {pose + R"(, "orientation": [1, 1, 1, 1]}})", "start_pose.orientation"},
+  };
   for (const char* colour : {"red", "#12345", "#12345g", "#-12345", "1234567"})
-    EXPECT_THAT(error(fmt::format(R"({{"background": "{}"}})", colour).c_str()),
-                AllOf(HasSubstr("background:"), HasSubstr("#rrggbb")));
+    texts.push_back({fmt::format(R"({{"background": "{}"}})", colour), "background"});
   for (const char* metres : {"0", "-1", "1e7", "\"1 m\""})
-    EXPECT_THAT(error(fmt::format(R"({{"metres_per_unit": {}}})", metres).c_str()),
-                HasSubstr("metres_per_unit:"));
-  EXPECT_THAT(error(R"({"up": )"),
-              AllOf(HasSubstr("city.json: byte"), HasSubstr("(check the commas")));
-  EXPECT_THAT(error("[]"), HasSubstr("not a JSON object"));
-  EXPECT_THAT(error(R"({"up": "w"})"), HasSubstr("city.json: up:"));
-  EXPECT_THAT(error(R"({"up": [0, 0, 0]})"), HasSubstr("up: has no direction"));
-  EXPECT_THAT(error(R"({"near": 0})"), HasSubstr("near: is not positive"));
-  EXPECT_THAT(error(R"({"near": 1.1e9})"), HasSubstr("near: is beyond 1000000000 units"));
-  EXPECT_THAT(error(R"({"focus": [0, -1.1e9, 0]})"),
-              HasSubstr("focus: is no place in a scene: beyond 1000000000 units"));
-  EXPECT_THAT(error(R"({"near": 1e99})"), HasSubstr("near: is out of range"));
-  EXPECT_THAT(error(R"({"focus": [1, 2, "c"]})"), HasSubstr("focus[2]: is not a number"));
-  EXPECT_THAT(error(R"({"limits": {"min": [0, 0, 0], "max": [1, 0, 1]}})"), HasSubstr("limits"));
-  EXPECT_THAT(error(R"({"start_pose": {"position": [0, 0, 0]}})"),
-              HasSubstr("start_pose: 'look_at' or 'orientation' is missing"));
-  EXPECT_THAT(error(R"({"start_pose": {"position": [0, 0, 0], "orientation": [1, 1, 1, 1]}})"),
-              HasSubstr("start_pose.orientation"));
+    texts.push_back({fmt::format(R"({{"metres_per_unit": {}}})", metres), "metres_per_unit"});
+  for (const Text& t : texts)
+    EXPECT_EQ(refusal_of([&] { parse_sidecar(t.text); }), (Refusal{"city.json", t.where}))
+        << t.text;
+  EXPECT_EQ(input_error([] { parse_sidecar(R"({"mode": "swim"})"); }),
+            "city.json: mode: is no mode (write orbit, fly, walk)");
 }
 
 class Hints : public FolderTest {
@@ -211,7 +214,7 @@ TEST_F(Hints, UnusableCameraFilesOnlyLeaveANote) {
   ASSERT_EQ(notes_.size(), 1u);
   EXPECT_THAT(notes_[0], HasSubstr("cameras.json: [0].position"));
   write("s.json", R"({"near": -1})");
-  EXPECT_THAT(input_error([&] { find(); }), HasSubstr("s.json: near"));
+  EXPECT_EQ(refusal_of([&] { find(); }), (Refusal{(folder_ / "s.json").string(), "near"}));
 }
 
 TEST_F(Hints, WrittenSidecarsReadBackTheSame) {
@@ -232,19 +235,19 @@ TEST_F(Hints, WrittenSidecarsReadBackTheSame) {
 
 using JsonFiles = FolderTest;
 
-TEST_F(JsonFiles, LargerThanTheirLimitAreRefused) {
+TEST_F(JsonFiles, FilesAboveTheirLimitAreRefused) {
   // Files of that size without a byte on the disk.
-  const auto error = [&](std::uint64_t bytes, const std::function<void(const ByteSource&)>& read) {
-    const auto path = write("large.json", "");
+  const auto path = write("large.json", "");
+  const auto refusal = [&](std::uint64_t bytes, const auto& read) {
     std::filesystem::resize_file(path, bytes);
-    return input_error([&] { read(FileSource(path)); });
+    return refusal_of([&] { read(FileSource(path)); });
   };
   const auto read_meta = [&](const ByteSource&) {
     parse_sog_meta(FolderFiles(folder_.path()), "large.json");
   };
   const auto expect_limit = [&](std::uint64_t bytes, const auto& read) {
-    EXPECT_THAT(error(bytes, read), HasSubstr("is not valid JSON")) << "it was read";
-    EXPECT_THAT(error(bytes + 1, read), HasSubstr(fmt::format("at most {} make sense", bytes)));
+    EXPECT_EQ(refusal(bytes, read), (Refusal{path.string(), "byte 0"})) << "it was read";
+    EXPECT_EQ(refusal(bytes + 1, read), (Refusal{path.string(), ""}));
   };
   constexpr std::uint64_t mib = 1 << 20;
   expect_limit(4 * mib, read_meta);
@@ -253,7 +256,7 @@ TEST_F(JsonFiles, LargerThanTheirLimitAreRefused) {
   expect_limit(32 * mib, read_lod_tree);
 }
 
-TEST_F(JsonFiles, OfMoreValuesThanFitIntoMemoryAreRefused) {
+TEST_F(JsonFiles, TooManyValuesAreRefused) {
   const auto read = [](std::size_t zeros) {
     std::string text = "[0";
     for (std::size_t i = 1; i < zeros; ++i) text += ",0";
@@ -261,25 +264,24 @@ TEST_F(JsonFiles, OfMoreValuesThanFitIntoMemoryAreRefused) {
     return read_json(MemorySource("many.json", bytes_of(text)), text.size()).size();
   };
   EXPECT_EQ(read((1 << 20) - 2), (1u << 20) - 2) << "the array itself counts twice";
-  EXPECT_THAT(input_error([&] { read((1 << 20) - 1); }),
-              AllOf(HasSubstr("many.json"), HasSubstr("more than 1048576 values")));
+  EXPECT_EQ(refusal_of([&] { read((1 << 20) - 1); }), (Refusal{"many.json", ""}));
 }
 
 // In a time that grows as the square of their number, this would take minutes.
-TEST_F(JsonFiles, OfManyObjectsAreRead) {
+TEST_F(JsonFiles, ManyObjectsAreRead) {
   std::string text = "[{}";
   for (int i = 1; i < 500'000; ++i) text += ",{}";
   text += "]";
   EXPECT_EQ(read_json(MemorySource("many.json", bytes_of(text)), text.size()).size(), 500'000u);
 }
 
-TEST_F(JsonFiles, NestedDeeperThanTheStackMayTakeAreRefused) {
+TEST_F(JsonFiles, DeepNestingIsRefused) {
   const auto read = [](std::size_t depth) {
     const std::string text = std::string(depth, '[') + std::string(depth, ']');
     return read_json(MemorySource("deep.json", bytes_of(text)), text.size());
   };
   EXPECT_NO_THROW(read(256));
-  EXPECT_THAT(input_error([&] { read(257); }), HasSubstr("nested deeper than 256"));
+  EXPECT_EQ(refusal_of([&] { read(257); }), (Refusal{"deep.json", ""}));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ TEST(Sanitize, SurfelsAreFlatAndSound) {
   }
 }
 
-TEST(Sanitize, DropsWhatCannotBeDrawnAndKeepsTheOrder) {
+TEST(Sanitize, UndrawableGaussiansAreDroppedAndTheOrderStays) {
   GaussianCloud cloud = random_cloud(10000, 1);
   const GaussianCloud before = cloud;
   cloud.mean[10].y = nan;
@@ -60,7 +60,7 @@ TEST(Sanitize, DropsWhatCannotBeDrawnAndKeepsTheOrder) {
   EXPECT_EQ(cloud.mean[8992], before.mean[9001]);
 }
 
-TEST(Sanitize, KeepsTheFaintestAfterItsLogitWasWritten) {
+TEST(Sanitize, FaintestGaussiansSurviveWriting) {
   GaussianCloud cloud = test::random_cloud(2, 0, 1);
   const float faintest = 1.0f / 255.0f;
   cloud.opacity = {faintest * (1.0f - 3e-6f), 0.999f * faintest};
@@ -69,7 +69,7 @@ TEST(Sanitize, KeepsTheFaintestAfterItsLogitWasWritten) {
   EXPECT_EQ(cloud.opacity[0], faintest);
 }
 
-TEST(Sanitize, RepairsWhatHasAnObviousMeaning) {
+TEST(Sanitize, ValuesOfObviousMeaningAreRepaired) {
   GaussianCloud cloud = random_cloud(1000, 1);
   cloud.rotation[1] = glm::quat(0.0f, 0.0f, 0.0f, 0.0f);
   cloud.rotation[2] = glm::quat(1e-30f, 0.0f, 0.0f, -1e-30f);
@@ -95,7 +95,7 @@ TEST(Sanitize, RepairsWhatHasAnObviousMeaning) {
   EXPECT_EQ(cloud.sh[6 * 4 + 3].b, 0.0f);
 }
 
-TEST(Sanitize, EstablishesTheInvariantsOnRandomBytes) {
+TEST(Sanitize, InvariantsHoldAfterRandomBytes) {
   GaussianCloud cloud;
   cloud.resize(20000, 1);
   std::mt19937 random(3);

@@ -6,6 +6,7 @@
 #include <map>
 #include <sstream>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/load_scene.h"
@@ -36,7 +37,7 @@ class ScenePartsTest : public FolderTest {
       return std::uint64_t{whole.report.dropped};
     };
     const std::string bytes = built({each, whole.format, true});
-    const auto scene = scene_in_parts(path, {}, pool_, 777);
+    const auto scene = scene_in_parts(locate_scene(path), {}, pool_, 777);
     ASSERT_TRUE(scene);
     EXPECT_TRUE(built(scene->parts) == bytes) << "read once";
     EXPECT_TRUE(built(scene->parts, 0) == bytes) << "read twice";
@@ -67,21 +68,22 @@ TEST_F(ScenePartsTest, ATreeKeepsTheModel) {
   for (const SplatModel model : {SplatModel::antialiased, SplatModel::surfels}) {
     cloud.model = model;
     const auto path = write("a.ply", ply_bytes(cloud)), out = folder_ / "a.tree";
-    build_tree(scene_in_parts(path, {}, pool_, 777)->parts, out, 1'000'000, *pool_,
+    build_tree(scene_in_parts(locate_scene(path), {}, pool_, 777)->parts, out, 1'000'000, *pool_,
                LoadContext(*pool_));
     const GaussianCloud read = load_scene(out).cloud;
     EXPECT_EQ(read.model, model);
     const float thickness = model == SplatModel::surfels ? 2e-4f : 0.2f;  // not made flat twice
     for (const glm::vec3& scale : read.scale)
       ASSERT_NEAR(std::min({scale.x, scale.y, scale.z}), thickness, 0.5f * thickness);
-    EXPECT_EQ(open_in_pages(out).tree->model(), model);
+    EXPECT_EQ(open_in_pages(locate_scene(out)).tree->model(), model);
   }
   LoadOptions options;
   options.model = SplatModel::antialiased;
-  EXPECT_EQ(open_in_pages(folder_ / "a.tree", options).tree->model(), SplatModel::antialiased);
+  EXPECT_EQ(open_in_pages(locate_scene(folder_ / "a.tree"), options).tree->model(),
+            SplatModel::antialiased);
 }
 
-TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
+TEST_F(ScenePartsTest, PartsHaveTheGaussiansOfTheLoadedScene) {
   GaussianCloud cloud = random_cloud(5000, 1);
   for (std::size_t i = 0; i < cloud.size(); i += 7) cloud.mean[i].x = NAN;
   for (std::size_t i = 0; i < cloud.size(); i += 11) cloud.opacity[i] = 1e-4f;
@@ -91,7 +93,7 @@ TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
   const Scene whole = load_scene(path);
   ASSERT_EQ(whole.report.absurd, 1u);
 
-  const auto scene = scene_in_parts(path, {}, pool_, 777);
+  const auto scene = scene_in_parts(locate_scene(path), {}, pool_, 777);
   ASSERT_TRUE(scene);
   EXPECT_EQ(scene->hints.near_z, 0.125f);
   for (int pass = 0; pass < 2; ++pass) {
@@ -114,13 +116,13 @@ TEST_F(ScenePartsTest, HaveTheGaussiansOfTheLoadedScene) {
 }
 
 // A sample of every second row finds the same reach.
-TEST_F(ScenePartsTest, JudgeWhatIsAbsurdByASample) {
+TEST_F(ScenePartsTest, AbsurdGaussiansAreJudgedByASample) {
   GaussianCloud cloud = random_cloud(100'000, 0);
   cloud.mean[77'777].z = -2e8f;
   const auto path = write("a.ply", ply_bytes(cloud));
   std::size_t taken = 0;
   const std::uint64_t dropped =
-      scene_in_parts(path, {}, pool_)->parts.each([&](const GaussianCloud& part) {
+      scene_in_parts(locate_scene(path), {}, pool_)->parts.each([&](const GaussianCloud& part) {
         taken += part.size();
       });
   EXPECT_EQ(dropped, 1u);
@@ -168,12 +170,12 @@ TEST_F(ScenePartsTest, AStreamedSogInAnArchiveGivesTheTreeOfItsFolder) {
   expect_same_tree(write("a.ssog", zip(files)), 0);
 }
 
-TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
+TEST_F(ScenePartsTest, NotesTellWhatIsLeftOut) {
   GaussianCloud cloud = random_cloud(300, 3);
   std::string bytes = ply_bytes(cloud);
   // Harmonics of degree 4: 27 properties more, before those of the opacity.
   std::string more;
-  for (int k = 45; k < 72; ++k) more += "property float f_rest_" + std::to_string(k) + "\n";
+  for (int k = 45; k < 72; ++k) more += fmt::format("property float f_rest_{}\n", k);
   const std::size_t header_end = bytes.find("end_header\n") + 11;
   const std::size_t row = (bytes.size() - header_end) / cloud.size();
   std::string wider = bytes.substr(0, bytes.find("end_header")) + more + "end_header\n";
@@ -181,27 +183,29 @@ TEST_F(ScenePartsTest, SayWhatIsLeftOut) {
     wider += bytes.substr(header_end + i * row, row) + std::string(27 * 4, '\0');
   const auto path = write("a.ply", wider);
   EXPECT_THAT(load_scene(path).notes, ::testing::Contains(HasSubstr("degree 4 are not shown")));
-  EXPECT_THAT(scene_in_parts(path, {}, pool_)->notes,
+  EXPECT_THAT(scene_in_parts(locate_scene(path), {}, pool_)->notes,
               ::testing::Contains(HasSubstr("degree 4 are not shown")));
 }
 
-TEST_F(ScenePartsTest, AreNotOfOtherFormats) {
+TEST_F(ScenePartsTest, OtherFormatsHaveNoParts) {
   const GaussianCloud cloud = random_cloud(300, 0);
   for (const auto& path :
        {write("a.spz", encode_spz(cloud, {.version = 3})),
         write("b.splat", encode_spz(cloud, {.version = 3})),
         write("c.sog", zip(encode_sog(cloud, 2))),
         write("d.ply", encode_compressed_ply(cloud, false)), write_streamed_sog({{cloud}})})
-    EXPECT_FALSE(scene_in_parts(path, {}, pool_)) << path;
+    EXPECT_FALSE(scene_in_parts(locate_scene(path), {}, pool_)) << path;
 }
 
 TEST_F(ScenePartsTest, AFileThatIsCutOffIsRefused) {
   std::string bytes = ply_bytes(random_cloud(300, 0));
   bytes.resize(bytes.size() - 1);
   const auto path = write("a.ply", bytes);
-  EXPECT_THAT(input_error([&] { scene_in_parts(path, {}, pool_); }), HasSubstr("cut off"));
+  EXPECT_EQ(refusal_of([&] { scene_in_parts(locate_scene(path), {}, pool_); }),
+            (Refusal{path.string(), fmt::format("byte {}", bytes.size())}));
   const auto splat = write("b.splat", "x");
-  EXPECT_THAT(input_error([&] { scene_in_parts(splat, {}, pool_); }), HasSubstr("cut off"));
+  EXPECT_EQ(refusal_of([&] { scene_in_parts(locate_scene(splat), {}, pool_); }),
+            (Refusal{splat.string(), "byte 1"}));
 }
 
 }  // namespace

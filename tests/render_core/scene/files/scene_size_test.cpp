@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <fmt/format.h>
+
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -10,14 +12,12 @@
 namespace catgs::test {
 namespace {
 
-using ::testing::HasSubstr;
-
 class SceneSizeTest : public FolderTest {
  protected:
   /// The headers announce what is loaded, and its memory.
   void expect_as_loaded(const std::string& name, const std::string& content) {
     const auto path = write(name, content);
-    const SceneSize size = read_scene_size(path);
+    const SceneSize size = read_scene_size(locate_scene(path));
     const Scene scene = load_scene(path);
     EXPECT_EQ(size.gaussians, scene.report.read) << name;
     EXPECT_EQ(size.sh_degree, scene.cloud.sh_degree) << name;
@@ -25,7 +25,7 @@ class SceneSizeTest : public FolderTest {
   }
 };
 
-TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
+TEST_F(SceneSizeTest, SizesAreThoseOfTheLoadedScene) {
   ThreadPool pool(1);
   for (const int degree : {0, 3}) {
     const GaussianCloud cloud = random_cloud(300, degree);
@@ -40,27 +40,28 @@ TEST_F(SceneSizeTest, IsThatOfTheLoadedScene) {
   expect_as_loaded("f.spz", encode_spz(random_cloud(300, 3), {.extra_sh_degree = 4}));
 }
 
-TEST_F(SceneSizeTest, TakesTheHighestDegreeWhereOnlyImagesTell) {
-  const SceneSize size = read_scene_size(write("v1.sog", zip(encode_sog(random_cloud(90, 1), 1))));
+TEST_F(SceneSizeTest, HighestDegreeIsAssumedIfOnlyImagesTell) {
+  const SceneSize size =
+      read_scene_size(locate_scene(write("v1.sog", zip(encode_sog(random_cloud(90, 1), 1)))));
   EXPECT_EQ(size.gaussians, 90u);
   EXPECT_EQ(size.sh_degree, 3);
 }
 
-TEST_F(SceneSizeTest, ReadsFoldersToo) {
+TEST_F(SceneSizeTest, FoldersHaveSizesToo) {
   for (const auto& [name, content] : encode_sog(random_cloud(80, 2), 2))
     write("house/" + name, content);
-  EXPECT_EQ(read_scene_size(folder_ / "house").gaussians, 80u);
-  EXPECT_EQ(read_scene_size(folder_ / "house").sh_degree, 2);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).gaussians, 80u);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "house")).sh_degree, 2);
 }
 
-TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
+TEST_F(SceneSizeTest, OnlyHeadersAreRead) {
   // The rows are a hole in the file: nothing of it could be decoded in this time or memory.
   std::string header = ply_bytes(random_cloud(1, 3));
   header.resize(header.find("end_header\n") + 11);
   header.replace(header.find("vertex 1\n"), 9, "vertex 60000000\n");
   const auto path = write("huge.ply", header);
   std::filesystem::resize_file(path, header.size() + 60'000'000ull * 62 * 4);
-  const SceneSize size = read_scene_size(path);
+  const SceneSize size = read_scene_size(locate_scene(path));
   EXPECT_EQ(size.gaussians, 60'000'000u);
   EXPECT_EQ(size.bytes(), GaussianCloud::bytes(60'000'000, 3));
 }
@@ -68,10 +69,11 @@ TEST_F(SceneSizeTest, ReadsNoMoreThanHeaders) {
 TEST_F(SceneSizeTest, ACountThatTheFileCannotHoldIsAnError) {
   std::string lying = ply_bytes(random_cloud(10, 0));
   lying.replace(lying.find("vertex 10"), 9, "vertex 99");
-  EXPECT_THAT([&] { read_scene_size(write("a.ply", lying)); },
-              ::testing::ThrowsMessage<InputError>(HasSubstr("a.ply")));
-  EXPECT_THROW(read_scene_size(write("b.txt", "hello")), InputError);
-  EXPECT_THROW(read_scene_size(folder_ / "absent.ply"), InputError);
+  const std::string path = write("a.ply", lying).string();
+  EXPECT_EQ(refusal_of([&] { read_scene_size(locate_scene(path)); }),
+            (Refusal{path, fmt::format("byte {}", lying.size())}));
+  EXPECT_THROW(read_scene_size(locate_scene(write("b.txt", "hello"))), InputError);
+  EXPECT_THROW(read_scene_size(locate_scene(folder_ / "absent.ply")), InputError);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ TEST_F(ToursOnDisk, MistakesNameFileAndField) {
               HasSubstr("hall.json: byte"));
 }
 
-TEST_F(ToursOnDisk, MayShowMediaOfAnySiteByHttps) {
+TEST_F(ToursOnDisk, MediaOfAnySiteNeedHttps) {
   const auto shows = [&](const char* src) {
     return mistake(fmt::format(
         R"({{"position": [0, 0, 0], "look_at": [0, 0, 1], "media": [{{"src": "{}"}}]}})", src));
@@ -41,7 +41,7 @@ TEST_F(ToursOnDisk, MayShowMediaOfAnySiteByHttps) {
   EXPECT_THAT(shows("http://media.example/a.mp4"), HasSubstr("media[0].src"));
 }
 
-TEST(MediaName, IsAPlainComponentOfAPath) {
+TEST(MediaName, NamesArePlainPathComponents) {
   for (const char* name : {"a.jpg", "A-b_c.2.webp", "0", "-.png"})
     EXPECT_TRUE(is_media_name(name)) << name;
   EXPECT_TRUE(is_media_name(std::string(100, 'a')));

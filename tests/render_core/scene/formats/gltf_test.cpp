@@ -37,7 +37,7 @@ struct Case {
 
 class GltfStyles : public ::testing::TestWithParam<Case> {};
 
-TEST_P(GltfStyles, AreReadAndTurnedToRightDownFront) {
+TEST_P(GltfStyles, FilesAreReadAndTurnedToRightDownFront) {
   for (const int degree : {0, 1, 2, 3}) {
     const GaussianCloud cloud = storable_cloud(5000, degree);
     const GltfFile read = parse_gltf(encode_gltf(cloud, GetParam().style).glb());
@@ -90,7 +90,7 @@ TEST(Gltf, OpacitiesOfOneAreNoFaults) {
 
 class GltfDegrees : public ::testing::TestWithParam<int> {};
 
-TEST_P(GltfDegrees, WhatIsWrittenReadsBackBitForBit) {
+TEST_P(GltfDegrees, WrittenFilesReadBackBitForBit) {
   const GaussianCloud cloud = random_cloud(9000, GetParam());
   std::ostringstream out;
   write_glb(cloud, out);
@@ -104,7 +104,7 @@ TEST_P(GltfDegrees, WhatIsWrittenReadsBackBitForBit) {
 
 INSTANTIATE_TEST_SUITE_P(Gltf, GltfDegrees, ::testing::Values(0, 1, 2, 3));
 
-TEST(Gltf, WritesWhatTheSpecificationAsksFor) {
+TEST(Gltf, WrittenFilesFollowTheSpecification) {
   const GaussianCloud cloud = random_cloud(101, 1);
   std::ostringstream out;
   write_glb(cloud, out);
@@ -281,14 +281,13 @@ TEST_F(GltfFiles, BuffersMayBeDataOrLieBeside) {
   const Scene scene = load_scene(path);
   EXPECT_EQ(scene.format, "glTF");
   EXPECT_EQ(scene.cloud.mean, cloud.mean);
-  EXPECT_EQ(read_scene_size(path).gaussians, 300u);
-  EXPECT_EQ(read_scene_size(path).sh_degree, 1);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).gaussians, 300u);
+  EXPECT_EQ(read_scene_size(locate_scene(path)).sh_degree, 1);
 
   for (const char* uri : {"../bytes.bin", "%2e%2e/bytes.bin", "/etc/passwd", "a%00.bin", ""}) {
     parts.json["buffers"][0]["uri"] = uri;
     const auto climbing = write("elsewhere/room.gltf", parts.json.dump());
-    EXPECT_THAT(input_error([&] { load_scene(climbing); }),
-                ::testing::AnyOf(HasSubstr("leads out of the folder"), HasSubstr("zero byte")));
+    EXPECT_EQ(refusal_of([&] { load_scene(climbing); }).source, (folder_ / "elsewhere").string());
   }
 
   GltfParts small = encode_gltf(random_cloud(1, 0));
@@ -296,12 +295,12 @@ TEST_F(GltfFiles, BuffersMayBeDataOrLieBeside) {
   EXPECT_EQ(parse_gltf(small.json.dump()).cloud.mean, random_cloud(1, 0).mean);
 }
 
-TEST_F(GltfFiles, AreKnownByTheirContentOrName) {
+TEST_F(GltfFiles, FilesAreKnownByContentOrName) {
   const GaussianCloud cloud = random_cloud(300, 2);
   const Scene scene = load_scene(write("a.ply", encode_gltf(cloud).glb()));
   EXPECT_EQ(scene.format, "glTF");
   EXPECT_EQ(scene.cloud.size(), 300u);
-  const SceneSize size = read_scene_size(folder_ / "a.ply");
+  const SceneSize size = read_scene_size(locate_scene(folder_ / "a.ply"));
   EXPECT_EQ(size.gaussians, 300u);
   EXPECT_EQ(size.sh_degree, 2);
 }

@@ -1,6 +1,5 @@
 #include "render_core/scene/formats/lcc2.h"
 
-#include <functional>
 #include <memory>
 #include <string>
 
@@ -13,7 +12,7 @@
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/transform.h"
 #include "tests/render_core/scene/formats/encoders.h"
-#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/render_core/scene/formats/json_refusals.h"
 
 namespace catgs::test {
 namespace {
@@ -74,13 +73,18 @@ class Lcc2Test : public FolderTest {
     write("hall.lcc2", scene_.dump());
     return open_lcc2(std::make_shared<FolderFiles>(folder_.path()), "hall.lcc2", level, budget);
   }
-  std::string error_of(const std::function<void(Json& scene)>& change) {
-    const Json before = scene_;
-    change(scene_);
-    const std::string error = input_error([&] { open(); });
-    scene_ = before;
-    return error;
+  /// Each change of the .lcc2 must be refused.
+  void expect_all(const std::vector<JsonRefusal>& refusals) {
+    const auto open_changed = [&](const Json& scene) {
+      scene_ = scene;
+      open();
+    };
+    const Json sound = scene_;
+    expect_refused(sound, at("").source, open_changed, refusals);
+    scene_ = sound;
   }
+  /// What an error names that the .lcc2 is refused with.
+  Refusal at(const std::string& where) const { return {(folder_ / "hall.lcc2").string(), where}; }
 
   std::string extension_;
   std::map<std::string, GaussianCloud> clouds_;  // in right, down, front
@@ -97,7 +101,7 @@ TEST_F(Lcc2Test, LeavesAreTheFinestLevel) {
     EXPECT_EQ(open(2).count, 90u);
     EXPECT_EQ(open({}, 599).count, 300u);
     EXPECT_EQ(open({}, 250).count, 90u + 60);  // only the first region's next level fits
-    EXPECT_THAT(input_error([&] { open({}, 89); }), HasSubstr("89 is less than the 90"));
+    EXPECT_EQ(refusal_of([&] { open({}, 89); }), at("Gaussian budget"));
     EXPECT_THAT(open().notes, Contains(HasSubstr("originated from XGRIDS")));
   }
 }
@@ -130,7 +134,7 @@ TEST_F(Lcc2Test, SurroundingsBelongToEveryLevel) {
   EXPECT_EQ(open().count, 607u);
   EXPECT_EQ(open(2).count, 97u);
   EXPECT_EQ(open({}, 306).count, 97u + 60);
-  EXPECT_THAT(input_error([&] { open({}, 96); }), HasSubstr("96 is less than the 97"));
+  EXPECT_EQ(refusal_of([&] { open({}, 96); }), at("Gaussian budget"));
   const GaussianCloud whole = read_levels(open(), two_threads());
   EXPECT_EQ(whole.mean[606], clouds_["env"].mean[6]);
   scene_["root"]["data"] = nullptr;
@@ -146,7 +150,7 @@ TEST_F(Lcc2Test, EarlierNamesOfFieldsAreKnown) {
   EXPECT_EQ(open().count, 600u);
 }
 
-TEST_F(Lcc2Test, IsFoundByItsFileAndItsFolder) {
+TEST_F(Lcc2Test, ScenesAreFoundByFileAndFolder) {
   open();
   const Scene scene = load_scene(folder_ / "hall.lcc2");
   EXPECT_EQ(scene.name, "hall");
@@ -155,79 +159,66 @@ TEST_F(Lcc2Test, IsFoundByItsFileAndItsFolder) {
   LoadOptions coarse;
   coarse.lod = 2;
   EXPECT_EQ(load_scene(folder_.path(), coarse).hints.near_z, 0.125f);
-  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2", coarse).gaussians, 90u);
-  EXPECT_EQ(read_scene_size(folder_ / "hall.lcc2").sh_degree, 2);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "hall.lcc2"), coarse).gaussians, 90u);
+  EXPECT_EQ(read_scene_size(locate_scene(folder_ / "hall.lcc2")).sh_degree, 2);
   std::filesystem::rename(folder_ / "hall.lcc2", folder_ / "meta.lcc2");
   EXPECT_EQ(load_scene(folder_ / "meta.lcc2").name, folder_.path().filename().string());
 }
 
 TEST_F(Lcc2Test, ErrorsNameTheField) {
-  EXPECT_THAT(error_of([](Json& j) { j["version"] = "1.0"; }),
-              HasSubstr("hall.lcc2: version: is not supported"));
-  EXPECT_THAT(error_of([](Json& j) { j["splatType"] = ".ply"; }), HasSubstr("splatType"));
-  EXPECT_THAT(error_of([](Json& j) { j.erase("root"); }), HasSubstr("'root' is missing"));
-  EXPECT_THAT(error_of([](Json& j) { j["root"].erase("splatFiles"); }), HasSubstr("'files'"));
-  EXPECT_THAT(error_of([](Json& j) { j["root"].erase("child"); }),
-              HasSubstr("root: holds no Gaussians"));
-  EXPECT_THAT(error_of([](Json& j) { j["root"]["child"]["0"]["data"]["3dgs"]["name"] = 4; }),
-              HasSubstr("root.child.0.data.3dgs.name: is 4, and there are 4"));
-  EXPECT_THAT(error_of([](Json& j) { j["root"]["data"]["env"]["name"] = -1; }),
-              HasSubstr("root.data.env.name"));
-  EXPECT_THAT(
-      error_of([](Json& j) { j["root"]["child"]["0"]["data"]["3dgs"]["start"] = 1ull << 60; }),
-      HasSubstr("root.child.0.data.3dgs: is out of range"));
+  const std::string first = "/root/child/0/data/3dgs", at_first = "root.child.0.data.3dgs";
+  expect_all({
+      {"/version", "1.0", "version"},
+      {"/splatType", ".ply", "splatType"},
+      {"/root", removed, ""},
+      {"/root/splatFiles", removed, "root"},
+      {"/root/child", removed, "root"},
+      {first + "/name", 4, at_first + ".name"},
+      {"/root/data/env/name", -1, "root.data.env.name"},
+      {first + "/start", 1ull << 60, at_first},
+  });
 }
 
 TEST_F(Lcc2Test, RangesAreThereAndDoNotOverlap) {
-  const auto fine = [](Json& j) -> Json& {
-    return j["root"]["child"]["1"]["child"]["0"]["child"]["1"]["data"]["3dgs"];
-  };
-  EXPECT_THAT(error_of([&](Json& j) { fine(j)["count"] = 101; }),
-              HasSubstr("Gaussians 400 to 501 of data/3dgs/2.sog overlap others or are not there"));
-  EXPECT_THAT(error_of([&](Json& j) { fine(j)["start"] = 399; }),
-              HasSubstr("Gaussians 399 to 499 of data/3dgs/2.sog overlap"));
+  const std::string fine = "/root/child/1/child/0/child/1/data/3dgs";
+  expect_all({{fine + "/count", 101, "root"}, {fine + "/start", 399, "root"}});
 }
 
 TEST_F(Lcc2Test, NoNameLeadsOutAndNoFileIsUsedTwice) {
-  for (const char* name : {"../2.sog", "/etc/passwd", ""})
-    EXPECT_THAT(error_of([&](Json& j) { j["root"]["splatFiles"][2] = name; }),
-                HasSubstr("leads out of the folder"));
-  EXPECT_THAT(error_of([&](Json& j) { j["root"]["splatFiles"][2] = "data/3dgs/1.sog"; }),
-              HasSubstr("data/3dgs/1.sog: is used a second time"));
-  EXPECT_THAT(error_of([&](Json& j) { j["root"]["data"]["env"]["name"] = 2; }),
-              HasSubstr("is used a second time"));
+  const std::string name = "/root/splatFiles/2", folder = folder_.path().string();
+  expect_all({
+      {name, "../2.sog", "file name '../2.sog'", folder},
+      {name, "/etc/passwd", "file name '/etc/passwd'", folder},
+      {name, "", "file name ''", folder},
+      {name, "data/3dgs/1.sog", "file data/3dgs/1.sog"},
+      {"/root/data/env/name", 2, "file data/3dgs/2.sog"},
+  });
 }
 
 TEST_F(Lcc2Test, DepthsAndNumbersHaveBounds) {
-  EXPECT_THAT(error_of([](Json& j) {
-                for (int i = 0; i < 70; ++i) {
-                  const Json inner = j["root"]["child"];
-                  j["root"]["child"] = Json::object();
-                  j["root"]["child"]["0"]["child"] = inner;
-                }
-              }),
-              HasSubstr("lies deeper than 64"));
-  EXPECT_THAT(
-      error_of([](Json& j) { j["root"]["child"] = std::vector<Json>(65'536, Json::object()); }),
-      HasSubstr("root.child[65535]: is one of more than 65536"));
-  EXPECT_THAT(error_of([](Json& j) {
-                j["root"]["splatFiles"] = std::vector<std::string>(65'537, "a.sog");
-              }),
-              HasSubstr("splatFiles: has more than 65536"));
-  EXPECT_THAT(error_of([](Json& j) { j["root"]["splatFiles"][0] = std::string(5000, 'a'); }),
-              HasSubstr("splatFiles[0]: has more than 4096 bytes"));
+  expect_all({
+      {"/root/child", std::vector<Json>(65'536, Json::object()), "root.child[65535]"},
+      {"/root/splatFiles", std::vector<std::string>(65'537, "a.sog"), "root.splatFiles"},
+      {"/root/splatFiles/0", std::string(5000, 'a'), "root.splatFiles[0]"},
+  });
+  for (int i = 0; i < 70; ++i) {
+    const Json inner = scene_["root"]["child"];
+    scene_["root"]["child"] = {{"0", {{"child", inner}}}};
+  }
+  EXPECT_THAT(refusal_of([&] { open(); }).where, ::testing::MatchesRegex(R"(root(\.child\.0)+)"));
   write("hall.lcc2", std::string((32 << 20) + 1, ' '));
-  EXPECT_THAT(input_error([&] {
-                open_lcc2(std::make_shared<FolderFiles>(folder_.path()), "hall.lcc2", {}, {});
-              }),
-              HasSubstr("hall.lcc2"));
+  EXPECT_EQ(refusal_of([&] {
+              open_lcc2(std::make_shared<FolderFiles>(folder_.path()), "hall.lcc2", {}, {});
+            }),
+            at(""));
 }
 
 TEST_F(Lcc2Test, AFileThatChangesWhileItIsReadIsRefused) {
   use(".spz");
   const OpenLevels scene = open();
   write("data/3dgs/2.spz", encode_spz(random_cloud(501, 1), {.version = 4}));
-  EXPECT_THAT(input_error([&] { read_levels(scene, two_threads()); }), HasSubstr("was changed"));
+  EXPECT_EQ(refusal_of([&] { read_levels(scene, two_threads()); }),
+            (Refusal{(folder_ / "data/3dgs/2.spz").string(), ""}));
 }
 
 }  // namespace

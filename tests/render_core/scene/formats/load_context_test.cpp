@@ -11,7 +11,7 @@
 namespace catgs {
 namespace {
 
-TEST(LoadContext, ReportsTheWholeWhenAnotherThreadEndsLast) {
+TEST(LoadContext, ProgressEndsAtOneWhicheverThreadEndsLast) {
   const auto loading_thread = std::this_thread::get_id();
   std::promise<void> reported;
   std::vector<double> progress;

@@ -18,7 +18,7 @@ std::vector<float> normal_numbers(std::size_t count, unsigned seed = 1) {
   return numbers;
 }
 
-TEST(CodebookTest, FindsTheNearestValue) {
+TEST(CodebookTest, NearestValuesAreFound) {
   const std::vector<float> numbers = normal_numbers(20'000);
   const Codebook book(numbers);
   EXPECT_TRUE(std::is_sorted(book.values().begin(), book.values().end()));
@@ -52,7 +52,7 @@ double error_of(const VectorTable& vectors, const Palette& palette) {
   return squares;
 }
 
-TEST(PaletteTest, FindsTheGroupsThatThereAre) {
+TEST(PaletteTest, GroupsAreFound) {
   constexpr std::size_t dims = 9, groups = 300, count = 30'000;
   const std::vector<float> centres = normal_numbers(groups * dims),
                            noise = normal_numbers(count * dims, 2);
@@ -71,7 +71,7 @@ TEST(PaletteTest, FindsTheGroupsThatThereAre) {
   EXPECT_LT(error_of(vectors, palette), 1.5 * variance);
 }
 
-TEST(PaletteTest, IsTheSameForAnyNumberOfThreads) {
+TEST(PaletteTest, PalettesAreTheSameForAnyNumberOfThreads) {
   const std::vector<float> numbers = normal_numbers(40'000 * 9);
   const VectorTable vectors{numbers.data(), 40'000, 9, 9};
   ThreadPool one(1), four(4);
@@ -82,7 +82,7 @@ TEST(PaletteTest, IsTheSameForAnyNumberOfThreads) {
   EXPECT_GT(a.entries.size() / 9, 2900u) << "entries are used";
 }
 
-TEST(PaletteTest, OneEntryForEachWhereThereAreEnough) {
+TEST(PaletteTest, EachVectorHasAnEntryWhileThereAreEnough) {
   const std::vector<float> numbers = normal_numbers(100 * 24);
   const VectorTable vectors{numbers.data(), 100, 24, 24};
   ThreadPool pool(2);

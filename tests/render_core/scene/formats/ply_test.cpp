@@ -7,14 +7,15 @@
 #include <numeric>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "render_core/scene/activations.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 GaussianCloud parse(const std::string& bytes) {
   const MemorySource file("scene.ply", bytes_of(bytes));
@@ -196,63 +197,66 @@ TEST(Ply, ShOfDegreeFourIsCutToThree) {
 }
 
 TEST(Ply, ErrorsNameTheHeaderLine) {
-  EXPECT_THAT(input_error([] { parse("plx\n"); }), HasSubstr("scene.ply: header line 1"));
-  EXPECT_THAT(input_error([] { parse("ply\nformat ascii 2.0\n"); }), HasSubstr("header line 2"));
-  EXPECT_THAT(input_error([] { parse("ply\nformat ascii 1.0\nelement vertex -1\n"); }),
-              AllOf(HasSubstr("header line 3"), HasSubstr("'-1' is not a count")));
-  EXPECT_THAT(input_error([] { parse("ply\nformat ascii 1.0\nproperty float x\n"); }),
-              HasSubstr("before the first element"));
-  EXPECT_THAT(input_error([] {
-                parse("ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n");
-              }),
-              AllOf(HasSubstr("header line 4"), HasSubstr("unknown type 'quad'")));
-  EXPECT_THAT(input_error([] { parse("ply\nformat ascii 1.0\nelement vertex 1\n"); }),
-              HasSubstr("ends inside the header"));
+  const std::string format = "ply\nformat ascii 1.0\n";
+  struct Header {
+    std::string text;
+    int line;
+  };
+  for (const Header& header : std::vector<Header>{
+           {"plx\n", 1},
+           {"ply\nformat ascii 2.0\n", 2},
+           {format + "element vertex -1\n", 3},
+           {format + "property float x\n", 3},
+           {format + "element vertex 1\nproperty quad x\nend_header\n", 4},
+           {format + "element vertex 1\n", 3},
+           {"ply\nend_header\n", 2},
+           {format + "element a 1\nelement a 1\n", 4},
+           {format + "element a 1\nproperty list uchar quad a\nend_header\n", 4},
+       })
+    EXPECT_EQ(refusal_of([&] { parse(header.text); }),
+              (Refusal{"scene.ply", fmt::format("header line {}", header.line)}))
+        << header.text;
+  EXPECT_EQ(input_error([&] { parse(format + "element vertex -1\n"); }),
+            "scene.ply: header line 3: '-1' is not a count");
   const auto with_header_of = [](std::size_t bytes) {
     std::string ply = ply_bytes(random_cloud(3, 0));
     const std::size_t more = bytes - (ply.find("end_header\n") + 11);
     return ply.insert(4, "comment " + std::string(more - 9, 'x') + "\n");
   };
   EXPECT_NO_THROW(parse(with_header_of(65'536)));
-  EXPECT_THAT(input_error([&] { parse(with_header_of(65'537)); }), HasSubstr("64 KiB"));
-  EXPECT_THAT(input_error([] { parse("ply\nend_header\n"); }), HasSubstr("'format'"));
-  EXPECT_THAT(input_error([] { parse("ply\nformat ascii 1.0\nelement a 1\nelement a 1\n"); }),
-              HasSubstr("second element 'a'"));
+  EXPECT_THAT(refusal_of([&] { parse(with_header_of(65'537)); }).where, StartsWith("header line "));
 }
 
-TEST(Ply, ErrorsNameTheMissingProperty) {
-  std::string bytes = ply_bytes(random_cloud(3, 1));
-  std::string no_opacity = bytes;
-  no_opacity.replace(no_opacity.find("opacity"), 7, "opaaity");
-  EXPECT_THAT(input_error([&] { parse(no_opacity); }), HasSubstr("property opacity"));
-  std::string odd_sh = bytes;
-  odd_sh.replace(odd_sh.find("f_rest_8"), 8, "f_xxxx_8");
-  EXPECT_THAT(input_error([&] { parse(odd_sh); }), HasSubstr("f_rest_*: 8 of them"));
-  EXPECT_THAT(input_error([] {
-                parse("ply\nformat ascii 1.0\nelement face 1\nproperty int a\nend_header\n1\n");
-              }),
-              HasSubstr("no element vertex"));
-}
-
-TEST(Ply, ListsAreRefusedWhereTheyHideTheGaussians) {
+TEST(Ply, ErrorsNameTheElementOrProperty) {
   const auto with = [](const std::string& before, const std::string& line) {
-    std::string bytes = ply_bytes(random_cloud(3, 0));
+    std::string bytes = ply_bytes(random_cloud(3, 1));
     return bytes.insert(bytes.find(before), line);
   };
+  const auto renamed = [](const std::string& from, const std::string& to) {
+    std::string bytes = ply_bytes(random_cloud(3, 1));
+    return bytes.replace(bytes.find(from), from.size(), to);
+  };
   const std::string list = "property list uchar int indices\n";
-  EXPECT_THAT(input_error([&] { parse(with("end_header", list)); }),
-              AllOf(HasSubstr("element vertex"), HasSubstr("has a list property")));
-  EXPECT_THAT(input_error([&] { parse(with("element vertex", "element face 1\n" + list)); }),
-              AllOf(HasSubstr("element vertex"), HasSubstr("an element before it has a list")));
+  struct File {
+    std::string bytes;
+    const char* where;
+  };
+  for (const File& file : std::vector<File>{
+           {renamed("opacity", "opaaity"), "property opacity"},
+           {renamed("f_rest_8", "f_xxxx_8"), "property f_rest_*"},
+           {"ply\nformat ascii 1.0\nelement face 1\nproperty int a\nend_header\n1\n", "header"},
+           {with("end_header", list), "element vertex"},
+           {with("element vertex", "element face 1\n" + list), "element vertex"},
+           {renamed("vertex 3", "vertex 0"), "element vertex"},
+       })
+    EXPECT_EQ(refusal_of([&] { parse(file.bytes); }), (Refusal{"scene.ply", file.where}));
   EXPECT_EQ(parse(with("end_header", "element face 0\n" + list)).size(), 3u);
-  EXPECT_THAT(input_error([&] { parse(with("end_header", "property list uchar quad a\n")); }),
-              HasSubstr("unknown type 'quad'"));
 }
 
 TEST(Ply, CutOffFilesAreRefusedAtEveryLength) {
   const std::string bytes = ply_bytes(random_cloud(4, 1));
   for (std::size_t length = 0; length < bytes.size(); ++length)
-    EXPECT_THAT(input_error([&] { parse(bytes.substr(0, length)); }), HasSubstr("scene.ply"))
+    EXPECT_EQ(refusal_of([&] { parse(bytes.substr(0, length)); }).source, "scene.ply")
         << "cut at byte " << length;
 }
 
@@ -261,14 +265,11 @@ TEST(Ply, LyingCountsAreRefusedBeforeMemoryIsTaken) {
   for (const char* count : {"5", "200000000", "18446744073709551615"}) {
     std::string lie = bytes;
     lie.replace(lie.find("vertex 4"), 8, std::string("vertex ") + count);
-    input_error([&] { parse(lie); });
+    refusal_of([&] { parse(lie); });
     std::string ascii_lie = lie;
     ascii_lie.replace(ascii_lie.find("binary_little_endian"), 20, "ascii");
-    input_error([&] { parse(ascii_lie); });
+    refusal_of([&] { parse(ascii_lie); });
   }
-  std::string none = bytes;
-  none.replace(none.find("vertex 4"), 8, "vertex 0");
-  EXPECT_THAT(input_error([&] { parse(none); }), HasSubstr("no Gaussians"));
 }
 
 TEST(Ply, AsciiErrorsNameTheByte) {
@@ -276,7 +277,8 @@ TEST(Ply, AsciiErrorsNameTheByte) {
   std::string garbage = text;
   const std::size_t at = garbage.find("end_header\n") + 11;
   garbage[at] = '?';
-  EXPECT_THAT(input_error([&] { parse(garbage); }), HasSubstr("byte " + std::to_string(at)));
+  EXPECT_EQ(refusal_of([&] { parse(garbage); }),
+            (Refusal{"scene.ply", fmt::format("byte {}", at)}));
 }
 
 }  // namespace

@@ -129,7 +129,7 @@ class SplatTransform : public FolderTest, public ::testing::WithParamInterface<C
 
 class SplatTransformReads : public SplatTransform {};
 
-TEST_P(SplatTransformReads, WhatWeWrite) {
+TEST_P(SplatTransformReads, WrittenFilesAreRead) {
   const GaussianCloud cloud = storable_cloud(GetParam().sh_degree);
   const std::string file = GetParam().file;
   if (file.ends_with(".ksplat"))
@@ -149,7 +149,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, SplatTransformReads,
 
 class SplatTransformWrites : public SplatTransform {};
 
-TEST_P(SplatTransformWrites, WhatWeRead) {
+TEST_P(SplatTransformWrites, FilesOfTheToolAreRead) {
   const GaussianCloud cloud = storable_cloud(GetParam().sh_degree);
   save_scene(cloud, folder_ / "wanted.ply");
   transform("wanted.ply", GetParam().file);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "render_core/math/spherical_harmonics-inl.h"
 #include "render_core/scene/formats/format_limits.h"
@@ -12,9 +13,6 @@
 
 namespace catgs::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 SpzFile parse(const std::string& bytes) {
   return read_spz(MemorySource("scene.spz", bytes_of(bytes)), two_threads());
@@ -42,7 +40,7 @@ struct Case {
 
 class SpzVersions : public ::testing::TestWithParam<Case> {};
 
-TEST_P(SpzVersions, AreReadAndTurnedToRightDownFront) {
+TEST_P(SpzVersions, VersionsAreReadAndTurnedToRightDownFront) {
   const GaussianCloud cloud = storable_cloud(5000, GetParam().sh_degree);
   const SpzFile spz = parse(encode_spz(cloud, {.version = GetParam().version}));
   EXPECT_EQ(spz.version, GetParam().version);
@@ -94,7 +92,7 @@ TEST(Spz, LargeScenesKeepTheirExtentWithFewerFractionalBits) {
   const GaussianCloud read = parse(out.str()).cloud;
   EXPECT_NEAR(read.mean[7].x, 100000.0f, 1.0f / 128);
   cloud.mean[7].x = 1e7f;
-  EXPECT_THAT(input_error([&] { write_spz(cloud, out); }), HasSubstr("does not fit"));
+  input_error([&] { write_spz(cloud, out); });
 }
 
 TEST(Spz, TheAxesExtensionIsObeyed) {
@@ -107,8 +105,8 @@ TEST(Spz, TheAxesExtensionIsObeyed) {
     EXPECT_NEAR(turned.mean[0].x, -cloud.mean[0].x, 0.001f);
     EXPECT_NEAR(turned.mean[0].y, cloud.mean[0].y, 0.001f);
     style.coordinate_system = 17;
-    EXPECT_THAT(input_error([&] { parse(encode_spz(cloud, style)); }),
-                HasSubstr("coordinate system 17 is not in 1…16"));
+    EXPECT_EQ(refusal_of([&] { parse(encode_spz(cloud, style)); }),
+              (Refusal{"scene.spz", "extension SPZ_ADOBE_coordinate_system"}));
   }
 }
 
@@ -193,7 +191,7 @@ TEST(Spz, CutOffFilesAreRefusedAtEveryLength) {
   for (const int version : {2, 4}) {
     const std::string bytes = encode_spz(cloud, {.version = version});
     for (std::size_t length = 2; length < bytes.size() - 8; ++length)  // gzip ends with a checksum
-      EXPECT_THAT(input_error([&] { parse(bytes.substr(0, length)); }), HasSubstr("scene.spz"))
+      EXPECT_EQ(refusal_of([&] { parse(bytes.substr(0, length)); }).source, "scene.spz")
           << "version " << version << " cut at byte " << length;
   }
 }
@@ -206,22 +204,29 @@ TEST(Spz, LyingHeadersAreRefusedBeforeMemoryIsTaken) {
     spz.replace(at, bytes.size(), bytes);
     return version < 4 ? gzip(spz) : spz;
   };
-  EXPECT_THAT(input_error([&] { parse(with(4, 8, "\xff\xff\xff\x0f")); }),
-              AllOf(HasSubstr("numPoints"), HasSubstr("compressed bytes")));
-  EXPECT_THAT(input_error([&] { parse(with(3, 8, "\xff\xff\xff\x0f")); }), HasSubstr("numPoints"));
-  EXPECT_THAT(input_error([&] { parse(with(3, 8, "\xff\xff\xff\xff")); }), HasSubstr("numPoints"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 8, std::string("\x15\0\0\0", 4))); }),
-              HasSubstr("size of the positions stream"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 12, "\x05")); }), HasSubstr("shDegree"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 13, "\x20")); }), HasSubstr("fractionalBits"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 15, "\x07")); }), HasSubstr("numStreams"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 16, "\xff\xff\xff\x7f")); }),
-              HasSubstr("tocByteOffset"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 32, "\xff\xff\xff\xff\xff\xff")); }),
-              HasSubstr("size of the positions stream"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 0, "NGSX")); }), HasSubstr("magic"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x09")); }), HasSubstr("version: 9"));
-  EXPECT_THAT(input_error([&] { parse(with(4, 4, "\x03")); }), HasSubstr("version"));
+  struct Lie {
+    int version;
+    std::size_t at;
+    std::string bytes;
+    const char* where;
+  };
+  for (const Lie& lie : std::vector<Lie>{
+           {4, 8, "\xff\xff\xff\x0f", "numPoints"},
+           {3, 8, "\xff\xff\xff\x0f", "numPoints"},
+           {3, 8, "\xff\xff\xff\xff", "numPoints"},
+           {4, 8, std::string("\x15\0\0\0", 4), "size of the positions stream"},
+           {4, 12, "\x05", "shDegree"},
+           {4, 13, "\x20", "fractionalBits"},
+           {4, 15, "\x07", "numStreams"},
+           {4, 16, "\xff\xff\xff\x7f", "tocByteOffset"},
+           {4, 32, "\xff\xff\xff\xff\xff\xff", "size of the positions stream"},
+           {4, 0, "NGSX", "magic"},
+           {4, 4, "\x09", "version"},
+           {4, 4, "\x03", "version"},
+       })
+    EXPECT_EQ(refusal_of([&] { parse(with(lie.version, lie.at, lie.bytes)); }),
+              (Refusal{"scene.spz", lie.where}))
+        << lie.at;
 }
 
 TEST(Spz, HarmonicsCountInWhatAHeaderCanClaim) {
@@ -230,14 +235,13 @@ TEST(Spz, HarmonicsCountInWhatAHeaderCanClaim) {
   const auto claimed = static_cast<std::uint32_t>(spz.size() * max_compression / 40);
   ASSERT_GT(claimed, 1u << 16);
   std::memcpy(spz.data() + 8, &claimed, sizeof claimed);
-  EXPECT_THAT(input_error([&] { parse(spz); }),
-              AllOf(HasSubstr("numPoints"), HasSubstr("compressed bytes")));
+  EXPECT_EQ(refusal_of([&] { parse(spz); }), (Refusal{"scene.spz", "numPoints"}));
 }
 
 TEST(Spz, DamagedStreamsNameTheByte) {
   std::string spz = encode_spz(storable_cloud(2000, 1), {.version = 3});
   for (std::size_t at = 200; at < 260; ++at) spz[at] = static_cast<char>(~spz[at]);
-  EXPECT_THAT(input_error([&] { parse(spz); }), HasSubstr("scene.spz: byte"));
+  EXPECT_THAT(refusal_of([&] { parse(spz); }).where, ::testing::StartsWith("byte "));
 }
 
 }  // namespace

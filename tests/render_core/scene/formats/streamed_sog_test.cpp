@@ -10,14 +10,12 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/scene_size.h"
 #include "tests/render_core/scene/formats/encoders.h"
+#include "tests/render_core/scene/formats/json_refusals.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/support/descriptor_limit.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 using Json = nlohmann::json;
 
@@ -52,9 +50,16 @@ class StreamedSogTest : public FolderTest {
     return cloud;
   }
 
-  StreamedSog load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
+  DecodedScene load(std::optional<int> level = {}, std::optional<std::size_t> budget = {}) {
     write("lod-meta.json", meta_.dump());
-    return read_streamed_sog(FolderFiles(folder_.path()), level, budget, two_threads());
+    const FolderFiles files(folder_.path());
+    const OpenStreamedSog scene = open_streamed_sog(files, level, budget);
+    return {scene.detail, read_streamed_sog(files, scene, two_threads())};
+  }
+
+  /// What an error names that lod-meta.json is refused with.
+  Refusal at(const std::string& where) const {
+    return {(folder_ / "lod-meta.json").string(), where};
   }
 
   Json meta_;
@@ -72,7 +77,7 @@ TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
   LoadOptions options;
   EXPECT_EQ(load_scene(path, options).cloud.mean, load().cloud.mean);
   options.lod = 2;
-  EXPECT_EQ(read_scene_size(path, options).gaussians, 33u);
+  EXPECT_EQ(read_scene_size(locate_scene(path), options).gaussians, 33u);
   const Scene scene = load_scene(path, options);
   EXPECT_EQ(scene.cloud.size(), 33u);
   EXPECT_EQ(scene.format, "streamed sog (level 2 of 0…2)");
@@ -81,7 +86,8 @@ TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
     files["env/" + name] = content;
   meta_["environment"] = "env/meta.json";
   files["lod-meta.json"] = meta_.dump();
-  EXPECT_EQ(read_scene_size(write("museum.ssog", zip(files)), options).gaussians, 40u);
+  EXPECT_EQ(read_scene_size(locate_scene(write("museum.ssog", zip(files))), options).gaussians,
+            40u);
 }
 
 TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
@@ -89,8 +95,8 @@ TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
   EXPECT_EQ(load(0).cloud.size(), 600u);
   EXPECT_EQ(load(1).cloud.size(), 40u + 50 + 12);  // the third node's next coarser one
   EXPECT_EQ(load(2).cloud.size(), 33u);
-  EXPECT_EQ(load(0).detail, "level 0 of 0…2");
-  EXPECT_EQ(load(1).detail, "levels 1 and 2 of 0…2");
+  EXPECT_EQ(load(0).format, "level 0 of 0…2");
+  EXPECT_EQ(load(1).format, "levels 1 and 2 of 0…2");
   const GaussianCloud coarse = random_cloud(33, 1, 33);
   const GaussianCloud read = load(2).cloud;
   for (std::size_t i = 0; i < 33; ++i)
@@ -112,7 +118,7 @@ TEST_F(StreamedSogTest, TheBudgetBuysTheFinestLevelsThatFit) {
   EXPECT_EQ(load({}, 62).cloud.size(), 33u);
   EXPECT_EQ(load({}, 102).cloud.size(), 102u);
   EXPECT_EQ(load({}, 162).cloud.size(), 162u);  // and its level 0 another 60
-  EXPECT_THAT(input_error([&] { load({}, 32); }), HasSubstr("33 of the coarsest level"));
+  EXPECT_EQ(refusal_of([&] { load({}, 32); }), at("Gaussian budget"));
 }
 
 TEST_F(StreamedSogTest, TheEnvironmentComesWithEveryLevel) {
@@ -120,7 +126,7 @@ TEST_F(StreamedSogTest, TheEnvironmentComesWithEveryLevel) {
   meta_["environment"] = "sky/meta.json";
   EXPECT_EQ(load(2).cloud.size(), 58u);
   EXPECT_EQ(load({}, 62).cloud.size(), 58u);
-  EXPECT_THAT(input_error([&] { load({}, 57); }), HasSubstr("Gaussian budget"));
+  EXPECT_EQ(refusal_of([&] { load({}, 57); }), at("Gaussian budget"));
 }
 
 TEST_F(StreamedSogTest, BundledSogFilesAreRead) {
@@ -170,61 +176,59 @@ TEST_F(StreamedSogTest, ArchivesAreUnpackedOneAtATime) {
   const auto look = [&](double) { most = std::max(most, resident_bytes()); };
   write("lod-meta.json", meta_.dump());
   ThreadPool pool(2);
-  read_streamed_sog(FolderFiles(folder_.path()), {}, {}, LoadContext(pool, look));
+  const FolderFiles scene(folder_.path());
+  read_streamed_sog(scene, open_streamed_sog(scene, {}, {}), LoadContext(pool, look));
   ASSERT_GT(most, 0u);
   EXPECT_LT(most, before + parts * files["junk"].size() / 4);
 }
 
 TEST_F(StreamedSogTest, ErrorsNameTheField) {
-  EXPECT_THAT(input_error([&] { load(3); }), HasSubstr("there is no level 3; 0 (finest) to 2 are"));
-  EXPECT_THAT(input_error([&] { load(-1); }), HasSubstr("there is no level -1"));
-  EXPECT_THAT(input_error([&] { load(1, 100); }), HasSubstr("give one"));
-  const Json good = meta_;
-  const auto error = [&](const std::function<void(Json&)>& change) {
-    meta_ = good;
-    change(meta_);
-    return input_error([&] { load(); });
+  EXPECT_EQ(input_error([&] { load(3); }),
+            (folder_ / "lod-meta.json").string() +
+                ": level of detail: there is no level 3; 0 (finest) to 2 are");
+  EXPECT_EQ(refusal_of([&] { load(-1); }), at("level of detail"));
+  EXPECT_EQ(refusal_of([&] { load(1, 100); }), at(""));
+  const auto read = [&](const Json& meta) {
+    meta_ = meta;
+    load();
   };
-  const auto first = [](Json& m) -> Json& { return m["tree"]["children"][0]["lods"]["0"]; };
-  EXPECT_THAT(error([](Json& m) { m["version"] = 2; }), HasSubstr("lod-meta.json: version"));
-  EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 0; }), HasSubstr("lodLevels"));
-  EXPECT_THAT(error([](Json& m) { m["lodLevels"] = 2; }), HasSubstr("'2' is no level in 0…1"));
-  EXPECT_THAT(error([&](Json& m) { first(m)["file"] = 3; }),
-              HasSubstr("tree.children[0].lods.0.file: is 3, and there are 3"));
-  EXPECT_THAT(error([&](Json& m) { first(m)["count"] = -1; }),
-              HasSubstr("tree.children[0].lods.0.count"));
-  EXPECT_THAT(error([&](Json& m) { first(m)["offset"] = 601; }), HasSubstr("fine/meta.json"));
-  EXPECT_THAT(error([&](Json& m) { first(m)["count"] = 101; }), HasSubstr("overlap"));
-  EXPECT_THAT(error([](Json& m) { m["tree"] = Json::object(); }), HasSubstr("tree: has no levels"));
-  EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "../x/meta.json"; }), HasSubstr("leads out"));
-  EXPECT_THAT(error([](Json& m) { m["filenames"][0] = "absent/meta.json"; }),
-              AllOf(HasSubstr("absent"), HasSubstr("cannot be opened")));
+  const std::string first = "/tree/children/0/lods/0", folder = folder_.path().string();
+  const std::string at_first = "tree.children[0].lods.0";
+  expect_refused(Json(meta_), at("").source, read,
+                 {
+                     {"/version", 2, "version"},
+                     {"/lodLevels", 0, "lodLevels"},
+                     {"/lodLevels", 2, "tree.children[0].lods"},
+                     {first + "/file", 3, at_first + ".file"},
+                     {first + "/count", -1, at_first + ".count"},
+                     {first + "/offset", 601, "tree"},
+                     {first + "/count", 101, "tree"},
+                     {"/tree", Json::object(), "tree"},
+                     {"/filenames/0", "../x/meta.json", "file name '../x/meta.json'", folder},
+                     {"/filenames/0", "absent/meta.json", "", folder + "/absent/meta.json"},
+                 });
 }
 
 TEST_F(StreamedSogTest, PartsShareNoFile) {
-  const auto error_with = [&](const std::string& other, const std::string& environment = "") {
+  const auto refusal_with = [&](const std::string& other, const std::string& environment = "") {
     meta_ = {{"lodLevels", 1}, {"filenames", {"fine/meta.json", other}}};
     if (!environment.empty()) meta_["environment"] = environment;
     for (int file = 0; file < 2; ++file)
       meta_["tree"]["children"].push_back({{"lods", {{"0", piece(file, 0, 10)}}}});
-    return input_error([&] { load(); });
+    return refusal_of([&] { load(); });
   };
-  EXPECT_THAT(error_with("./fine//meta.json"),
-              HasSubstr("lod-meta.json: file ./fine//meta.json: is used a second time"));
-  EXPECT_THAT(error_with("middle/meta.json", "fine/meta.json"),
-              HasSubstr("file fine/meta.json: is used a second time"));
+  EXPECT_EQ(refusal_with("./fine//meta.json"), at("file ./fine//meta.json"));
+  EXPECT_EQ(refusal_with("middle/meta.json", "fine/meta.json"), at("file fine/meta.json"));
   const auto files = encode_sog(random_cloud(600, 2, 600), 2);
   write("fine/other.json", files.at("meta.json"));
-  EXPECT_THAT(error_with("fine/other.json"),
-              HasSubstr("file fine/means_l.webp: is used a second time"));
+  EXPECT_EQ(refusal_with("fine/other.json"), at("file fine/means_l.webp"));
   Json shared = Json::parse(files.at("meta.json"));
   for (const char* attribute : {"means", "scales", "quats", "sh0", "shN"})
     for (Json& name : shared[attribute]["files"]) name = "other_" + name.get<std::string>();
   shared["shN"]["files"][0] = "shN_centroids.webp";
   for (const auto& [name, content] : files) write("fine/other_" + name, content);
   write("fine/other.json", shared.dump());
-  EXPECT_THAT(error_with("fine/other.json"),
-              HasSubstr("file fine/shN_centroids.webp: is used a second time"));
+  EXPECT_EQ(refusal_with("fine/other.json"), at("file fine/shN_centroids.webp"));
 }
 
 /// A picture of one colour is a few bytes, so SOGs of 65,536 Gaussians are small.
@@ -246,7 +250,7 @@ TEST_F(StreamedSogTest, ManySmallFilesMakeNoHugeScene) {
   add_part(0);
   EXPECT_EQ(load().cloud.size(), 65'536u);
   add_part(1);
-  EXPECT_THAT(input_error([&] { load(); }), HasSubstr("tree: 131072 Gaussians cannot be in"));
+  EXPECT_EQ(refusal_of([&] { load(); }), at("tree"));
 }
 
 TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
@@ -259,8 +263,9 @@ TEST_F(StreamedSogTest, EndlessNestingIsRefused) {
     return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document)));
   };
   EXPECT_NO_THROW(read(64));
-  EXPECT_THAT(input_error([&] { read(65); }), HasSubstr("lies deeper than 64"));
-  EXPECT_THAT(input_error([&] { read(200'000); }), HasSubstr("nested deeper than 256"));
+  EXPECT_THAT(refusal_of([&] { read(65); }).where,
+              ::testing::MatchesRegex(R"(tree(\.children\[0\])+)"));
+  EXPECT_EQ(refusal_of([&] { read(200'000); }), (Refusal{"lod-meta.json", ""}));
 }
 
 TEST_F(StreamedSogTest, TooManyFilesOrTooLongNamesAreRefused) {
@@ -273,10 +278,8 @@ TEST_F(StreamedSogTest, TooManyFilesOrTooLongNamesAreRefused) {
     return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))).files.size();
   };
   EXPECT_EQ(read(65'536, 4096), 65'536u);
-  EXPECT_THAT(input_error([&] { read(65'537, 1); }),
-              HasSubstr("filenames: has more than 65536 entries"));
-  EXPECT_THAT(input_error([&] { read(1, 4097); }),
-              HasSubstr("filenames[0]: has more than 4096 bytes"));
+  EXPECT_EQ(refusal_of([&] { read(65'537, 1); }), (Refusal{"lod-meta.json", "filenames"}));
+  EXPECT_EQ(refusal_of([&] { read(1, 4097); }), (Refusal{"lod-meta.json", "filenames[0]"}));
 }
 
 TEST_F(StreamedSogTest, TooManyNodesOrLevelsAreRefused) {
@@ -288,9 +291,9 @@ TEST_F(StreamedSogTest, TooManyNodesOrLevelsAreRefused) {
     return read_lod_tree(MemorySource("lod-meta.json", bytes_of(document))).nodes.size();
   };
   EXPECT_EQ(read(65'536, 16), 65'536u);
-  EXPECT_THAT(input_error([&] { read(65'537, 1); }),
-              HasSubstr("tree.children[65536].lods: is node 65537"));
-  EXPECT_THAT(input_error([&] { read(1, 17); }), HasSubstr("lodLevels: is not in 1…16"));
+  EXPECT_EQ(refusal_of([&] { read(65'537, 1); }),
+            (Refusal{"lod-meta.json", "tree.children[65536].lods"}));
+  EXPECT_EQ(refusal_of([&] { read(1, 17); }), (Refusal{"lod-meta.json", "lodLevels"}));
 }
 
 }  // namespace

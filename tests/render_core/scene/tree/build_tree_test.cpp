@@ -77,7 +77,7 @@ TEST(BuildTree, LevelsGetCoarserAndTheHeaderCountsThem) {
   }
 }
 
-TEST(BuildTree, LoadsAsTheSceneItWasMadeFrom) {
+TEST(BuildTree, TreesLoadAsTheScenesTheyWereMadeFrom) {
   ThreadPool pool(2);
   const GaussianCloud cloud = random_cloud(3'000, 2, 6);
   const TemporaryFolder folder;
@@ -105,7 +105,7 @@ TEST(BuildTree, FaintGaussiansAreNotLost) {
   EXPECT_EQ(load_scene(folder.write("a.tree", tree_bytes(cloud, pool))).cloud.size(), 600u);
 }
 
-TEST(BuildTree, RefusesNothingAndLeavesNothing) {
+TEST(BuildTree, EmptyScenesAreRefusedAndLeaveNoFile) {
   ThreadPool pool(1);
   const TemporaryFolder folder;
   const SceneParts nothing{[](const auto&) { return 0; }, "none"};

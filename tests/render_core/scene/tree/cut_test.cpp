@@ -140,7 +140,7 @@ std::vector<Camera> cameras_around() {
   return cameras;
 }
 
-TEST(Cut, HasNoHolesAndDrawsNothingTwice) {
+TEST(Cut, CutsHaveNoHolesAndDrawNothingTwice) {
   for (const int degree : {0, 3}) {
     SomePages tree(60'001, degree, 8 + static_cast<std::uint64_t>(degree));
     const std::vector<Camera> cameras = cameras_around();
@@ -181,7 +181,7 @@ TEST(Cut, FartherIsCoarser) {
   }
 }
 
-TEST(Cut, WithoutTheRootsPageItIsAskedFor) {
+TEST(Cut, MissingRootPageIsRequested) {
   SomePages tree(1000, 0, 5);
   tree.drop(0);
   const Cut cut = tree.cut({}, 0.0f);

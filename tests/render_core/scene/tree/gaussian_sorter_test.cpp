@@ -53,7 +53,7 @@ void expect_morton_order(const GaussianCloud& cloud, std::size_t memory_bytes, s
   }
 }
 
-TEST(GaussianSorter, SortsAsMortonOrderDoesInMemoryAndOnDisk) {
+TEST(GaussianSorter, OrderIsThatOfMortonOrderInMemoryAndOnDisk) {
   const GaussianCloud cloud = test::random_cloud(30'000, 1, 3);
   expect_morton_order(cloud, std::size_t{1} << 30, 7'777);
   expect_morton_order(cloud, 0, 7'777);  // 8 runs
@@ -67,7 +67,7 @@ TEST(GaussianSorter, EqualPlacesKeepTheirOrderOverRuns) {
   expect_morton_order(cloud, 0, 1000);
 }
 
-TEST(GaussianSorter, NamesTheFolderThatCannotBeWritten) {
+TEST(GaussianSorter, UnwritableFoldersAreNamed) {
   ThreadPool pool(1);
   GaussianSorter sorter(MortonCurve(glm::vec3(0), glm::vec3(1)), 5000, 0, 0, "/nowhere/at/all",
                         pool);

@@ -102,7 +102,7 @@ GaussianCloud wall(std::size_t count) {
   return sorted;
 }
 
-TEST(MergeNodes, LooksLikeItsChildrenFromItsErrorsDistance) {
+TEST(MergeNodes, NodesLookLikeTheirChildrenFromTheirErrorsDistance) {
   const GaussianCloud cloud = wall(1024);
   const Node leaves[] = {leaf(cloud, 0, 256), leaf(cloud, 256, 256), leaf(cloud, 512, 256),
                          leaf(cloud, 768, 256)};
@@ -139,7 +139,7 @@ TEST(MergeNodes, CoincidentGaussiansBecomeOneThatHidesAsMuch) {
   }
 }
 
-TEST(MergeNodes, KeepsMomentsAndProjectedArea) {
+TEST(MergeNodes, MomentsAndProjectedAreaAreKept) {
   // 255 lonely Gaussians in each child, and one pair that is worth joining.
   GaussianCloud cloud = test::random_cloud(257, 0, 5);
   for (std::size_t i = 0; i < 257; ++i) cloud.mean[i] = glm::vec3(100.0f * static_cast<float>(i));
@@ -184,7 +184,7 @@ TEST(MergeNodes, BoundsAndErrorsHoldThoseOfTheChildren) {
   EXPECT_GT(top.facts.error, std::max(a.facts.error, b.facts.error));
 }
 
-TEST(MergeNodes, WhoseGaussiansFitIntoOneClusterKeepsThem) {
+TEST(MergeNodes, NodesThatFitOneClusterKeepTheirGaussians) {
   const GaussianCloud cloud = test::random_cloud(200, 0, 7);
   const Node a = leaf(cloud, 0, 150), b = leaf(cloud, 150, 50);
   const Node node = merged(a, b, 0);

@@ -89,7 +89,7 @@ class Memory {
   double now_s_ = 0.0;
 };
 
-TEST(PageChoice, LoadsTheLargestErrorsFirst) {
+TEST(PageChoice, LargestErrorsAreLoadedFirst) {
   Memory memory(1000);
   Cut cut;
   memory.want(9, 1.0f, cut);
@@ -104,7 +104,7 @@ TEST(PageChoice, LoadsTheLargestErrorsFirst) {
   EXPECT_TRUE(step.drop.empty());
 }
 
-TEST(PageChoice, WithRoomForAllNothingGoes) {
+TEST(PageChoice, NothingIsDroppedWhileThereIsRoom) {
   Memory memory(PageChoice::slots_for(TreeShape(1'000'000, 0)));
   for (int turn = 0; turn < 100; ++turn) {
     Cut cut;
@@ -116,7 +116,7 @@ TEST(PageChoice, WithRoomForAllNothingGoes) {
   EXPECT_TRUE(memory.turn(Cut()).drop.empty());
 }
 
-TEST(PageChoice, ShortOfRoomTheUnusedGoFirst) {
+TEST(PageChoice, UnusedPagesAreDroppedFirst) {
   Memory memory(20);
   const std::uint64_t last = memory.shape().pages() - 1;
   const auto settle = [&](std::uint64_t page, float error_px) {
@@ -132,7 +132,7 @@ TEST(PageChoice, ShortOfRoomTheUnusedGoFirst) {
   EXPECT_FALSE(memory.holds(last));
 }
 
-TEST(PageChoice, ThoseInUseStayUnlessOthersNeedItClearlyMore) {
+TEST(PageChoice, PagesInUseStayUnlessOthersNeedRoomMore) {
   Memory memory(12);
   const std::uint64_t last = memory.shape().pages() - 1;
   const auto settle = [&](float error_px, float other_px) {
@@ -195,7 +195,7 @@ TEST(PageChoice, AFamilyWithAnUnreadablePageIsNotInMemory) {
   EXPECT_EQ(memory.choice().next(99, 8).load.size(), 2u);
 }
 
-TEST(PageChoice, AnyWishesKeepItsRules) {
+TEST(PageChoice, RulesHoldForAnyRequests) {
   std::mt19937_64 random(4);
   for (const std::uint32_t slots : {PageChoice::least_slots, 9u, 40u}) {
     Memory memory(slots, 2);
@@ -214,7 +214,7 @@ TEST(PageChoice, AnyWishesKeepItsRules) {
 // Wishes at rest, for far more than there is room for: memory fills, comes to rest, and nothing is
 // read twice on the way.
 // Errors grow towards the root, but a forged file may say something else.
-TEST(PageChoice, ForgedErrorsKeepItsRules) {
+TEST(PageChoice, RulesHoldForForgedErrors) {
   Memory memory(PageChoice::least_slots);  // one family fits
   Cut first;
   memory.want(1, 1.0f, first);
@@ -229,7 +229,7 @@ TEST(PageChoice, ForgedErrorsKeepItsRules) {
   EXPECT_FALSE(memory.holds(below)) << "the page above made room for it";
 }
 
-TEST(PageChoice, AtRestNothingIsLoadedTwice) {
+TEST(PageChoice, NothingIsLoadedTwiceAtRest) {
   std::mt19937_64 random(8);
   for (const std::uint32_t slots : {6u, 11u, 50u, 120u}) {
     Memory memory(slots, 2);
@@ -296,7 +296,7 @@ TEST(PageChoice, ANewTreeGetsARootAndALeavingOneGivesAllBack) {
   EXPECT_GE(memory.pages_of(1), 12u);
 }
 
-TEST(PageChoice, RefusesMoreTreesThanCanBeDrawn) {
+TEST(PageChoice, MoreTreesThanCanBeDrawnAreRefused) {
   Memory memory(4, 2);
   EXPECT_FALSE(memory.choice().add(2, memory.shape()));
 }

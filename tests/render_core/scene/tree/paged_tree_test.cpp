@@ -115,7 +115,7 @@ class PagedTreeTest : public testing::Test {
   std::string bytes_ = tree_bytes(random_cloud(60'000, 0, 11), pool_);
 };
 
-TEST_F(PagedTreeTest, SettlesToWhatTheCameraNeeds) {
+TEST_F(PagedTreeTest, TreesSettleToWhatTheCameraNeeds) {
   Slots slots(64);
   Looked looked(slots, tree());
   EXPECT_EQ(looked.tree.table()->size(), 1u);
@@ -136,7 +136,7 @@ TEST_F(PagedTreeTest, SettlesToWhatTheCameraNeeds) {
   EXPECT_EQ(figures.pool_bytes, 64'000u);
 }
 
-TEST_F(PagedTreeTest, ShortOfMemoryIsCoarserAndHasNoHole) {
+TEST_F(PagedTreeTest, ShortMemoryCostsDetailAndLeavesNoHole) {
   Slots few(PageChoice::least_slots), many(64);
   Looked short_of_memory(few, tree()), all_pages(many, tree());
   const Camera camera = camera_at(0, -6);
@@ -184,7 +184,7 @@ TEST_F(PagedTreeTest, PagesThatAFrameHoldsCostNoOthers) {
   EXPECT_GE(looked.tree.table()->size() + 3, full);
 }
 
-TEST_F(PagedTreeTest, BlendsInAndComesToRest) {
+TEST_F(PagedTreeTest, DetailBlendsInAndComesToRest) {
   Slots slots(64);
   Looked looked(slots, tree());
   looked.watch->look({{camera_at(0, -6)}, 0.5f});
@@ -320,7 +320,7 @@ TEST_F(PagedTreeTest, ACoreThatFailsFailsTheNextFrame) {
   EXPECT_TRUE(failed());
 }
 
-TEST_F(PagedTreeTest, WithoutTheRootThereIsNothing) {
+TEST_F(PagedTreeTest, DamagedRootsAreRefusedAndTakeNoRoom) {
   Slots slots(64);
   {
     std::string damaged = bytes_;

@@ -52,7 +52,7 @@ TEST(TreeShape, PagesAreAboutAQuarterOfAMegabyte) {
   }
 }
 
-TEST(TreeShape, HoldsTheLargestScene) {
+TEST(TreeShape, LargestSceneFits) {
   const TreeShape shape(TreeShape::max_gaussians, 3);
   EXPECT_EQ(shape.levels(), 27);
   EXPECT_EQ(shape.page_of({0, shape.leaves() - 1}), shape.pages() - 1);
