@@ -34,7 +34,7 @@ void PageSlots::put(std::uint32_t slot, const TreePage& page, std::uint64_t numb
   GaussianCloud cloud;
   cloud.resize(cluster_size, shape_.sh_degree());
   std::vector<math::CovarianceFactor<double>> factors;
-  shape_.for_each_node(number, [&](NodeId node) {
+  for_each_node_in(shape_, number, [&](NodeId node) {
     const std::size_t s = shape_.slot_of(node);
     const NodeFacts& facts = page.facts(s);
     factors.resize(facts.count);

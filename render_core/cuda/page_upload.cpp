@@ -33,7 +33,7 @@ PageUpload::PageUpload(const TreeShape& shape, const TreePage& page, std::uint64
       page.bytes().subspan(shape.block_offset(0), shape.slots() * shape.block_bytes());
   blocks.assign(whole.begin(), whole.end());
   errors.fill(-1.0f);
-  shape.for_each_node(number, [&](NodeId node) {
+  for_each_node_in(shape, number, [&](NodeId node) {
     const std::size_t s = shape.slot_of(node);
     const NodeFacts& facts = page.facts(s);
     units[s] = facts.units;
@@ -65,7 +65,8 @@ std::vector<PageEntry> entries_of(const PageTable& table) {
   for (std::size_t i = 0; i < pages.size(); ++i) {
     const PageInSlot* above = table.above(pages[i]->page);
     if (above == nullptr) continue;
-    const auto refined = static_cast<std::uint32_t>(shape.slot_of(shape.refined_by(pages[i]->page)));
+    const auto refined =
+        static_cast<std::uint32_t>(shape.slot_of(refined_by(shape, pages[i]->page)));
     entries[i].above = above->slot * clusters_per_slot + refined;
     PageEntry& entry_above = entries[place_of.at(above->page)];
     entry_above.below_since_s[refined - entry_above.first_bottom] = pages[i]->shown_since_s;

@@ -25,8 +25,8 @@ namespace catgs::test {
 struct ForgedTrees {
   static constexpr std::size_t gaussians = 20 * cluster_size - 10;
   explicit ForgedTrees(int sh_degree)
-      : shape(gaussians, sh_degree), bytes(tree_bytes(random_cloud(gaussians, sh_degree, 41), pool)) {
-  }
+      : shape(gaussians, sh_degree),
+        bytes(tree_bytes(random_cloud(gaussians, sh_degree, 41), pool)) {}
 
   using Forge = std::function<void(TreePage& page, std::uint64_t number)>;
   /// All pages, changed.
@@ -52,7 +52,8 @@ inline bool drawn_or_refused(RendererKind kind, std::string bytes) {
     const auto renderer = make_renderer(tree, options).renderer;
     for (const Pipeline pipeline : {Pipeline::exact, Pipeline::catgs}) {
       const auto view = renderer->make_view({.pipeline = pipeline});
-      for (const auto [distance, detail_px] : {std::pair(3.0f, 0.0f), {3.1f, 2.0f}, {60.0f, 0.0f}}) {
+      for (const auto [distance, detail_px] :
+           {std::pair(3.0f, 0.0f), {3.1f, 2.0f}, {60.0f, 0.0f}}) {
         const Rendered drawn = render_in(*view, tree_request(distance, detail_px));
         EXPECT_TRUE(
             std::ranges::all_of(drawn.rgb, [](float value) { return std::isfinite(value); }));
@@ -91,7 +92,7 @@ inline void expect_unused_slots_to_be_refused(RendererKind kind) {
 inline void expect_extreme_pages_to_be_drawn(RendererKind kind) {
   const auto each_node = [](const TreeShape& shape, const auto& change) {
     return [&shape, change](TreePage& page, std::uint64_t number) {
-      shape.for_each_node(number, [&](NodeId node) {
+      for_each_node_in(shape, number, [&](NodeId node) {
         const std::size_t slot = shape.slot_of(node);
         change(node, page.facts(slot), page.block(slot));
       });
@@ -138,7 +139,8 @@ inline void expect_random_pages_to_be_drawn_or_refused(RendererKind kind, int ro
     const auto forge = [&](TreePage& page, std::uint64_t number) {
       if (below(2) == 0) return;
       std::vector<std::size_t> slots;
-      trees.shape.for_each_node(number, [&](NodeId n) { slots.push_back(trees.shape.slot_of(n)); });
+      for_each_node_in(trees.shape, number,
+                       [&](NodeId n) { slots.push_back(trees.shape.slot_of(n)); });
       const std::size_t slot = slots[below(slots.size())];
       const std::span<std::byte> block = page.block(slot);
       const std::uint32_t count = page.facts(slot).count;
@@ -150,7 +152,8 @@ inline void expect_random_pages_to_be_drawn_or_refused(RendererKind kind, int ro
         else  // a factor
           block[packed_offset(16, 16, record) + below(12)] = byte;
       }
-      if (below(8) == 0) page.bytes()[below(page.bytes().size())] = static_cast<std::byte>(random());
+      if (below(8) == 0)
+        page.bytes()[below(page.bytes().size())] = static_cast<std::byte>(random());
     };
     drawn += drawn_or_refused(kind, trees.with(forge)) ? 1 : 0;
   }

@@ -163,7 +163,7 @@ PageOfTree PageChoice::family_of(const PageOfTree& page) const {
 std::optional<PageOfTree> PageChoice::above(const PageOfTree& first) const {
   const TreeShape& shape = *trees_.at(first.tree);
   if (shape.root_of(first.page) == shape.root()) return std::nullopt;
-  const PageOfTree up = family_of({first.tree, shape.page_of(shape.refined_by(first.page))});
+  const PageOfTree up = family_of({first.tree, shape.page_of(refined_by(shape, first.page))});
   if (shape.root_of(up.page) == shape.root()) return std::nullopt;
   return up;
 }

@@ -90,8 +90,7 @@ const char* excess_over(const NodeFacts& above, const NodeFacts& node) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto of = [axis](const glm::vec3& v) { return static_cast<double>(v[axis]); };
     const double centre = of(above.bounds.centre);
-    const double reaches =
-        std::abs(of(node.bounds.centre) - centre) + of(node.bounds.half_extent);
+    const double reaches = std::abs(of(node.bounds.centre) - centre) + of(node.bounds.half_extent);
     if (reaches > of(above.bounds.half_extent) + rounding * std::abs(centre) + least) return "box";
   }
   return nullptr;
@@ -121,7 +120,7 @@ void TreePage::check(std::uint64_t number, std::string_view file, const NodeFact
   std::memcpy(&sum, bytes_.data(), sizeof sum);
   if (sum != checksum(number)) refuse("its checksum is wrong");
   std::uint32_t used = 0;  // a bit for each slot
-  shape_->for_each_node(number, [&](NodeId node) {
+  for_each_node_in(*shape_, number, [&](NodeId node) {
     const std::size_t slot = shape_->slot_of(node);
     used |= 1u << slot;
     const NodeFacts& f = facts(slot);

@@ -44,7 +44,8 @@ class TreePage {
   /// Throws InputError that names `file`, the page's offset and what is wrong: the checksum, or a
   /// value that no core may meet. Afterwards the bytes may be uploaded as they are: counts are in
   /// range, errors and bounds are finite and grow towards the root, means lie in their node's
-  /// bounds, and unused bytes are zeros. `above`: of the node that the page refines, if it is known.
+  /// bounds, and unused bytes are zeros. `above`: of the node that the page refines, if it is
+  /// known.
   void check(std::uint64_t number, std::string_view file, const NodeFacts* above = nullptr) const;
 
  private:

@@ -93,11 +93,6 @@ class TreeShape {
     return {static_cast<std::uint8_t>(top_level(band)),
             static_cast<std::uint32_t>(page - first_page_[static_cast<std::size_t>(band)])};
   }
-  /// The node that a page refines. The page is not that of the root.
-  [[nodiscard]] NodeId refined_by(std::uint64_t page) const {
-    const NodeId root = root_of(page);
-    return {static_cast<std::uint8_t>(root.level + 1), root.index / 2};
-  }
   /// Pages come and go by family: the one or two pages that refine one node. The first of them.
   [[nodiscard]] std::uint64_t family_of(std::uint64_t page) const {
     return root_of(page).index % 2 == 1 ? page - 1 : page;
@@ -119,19 +114,6 @@ class TreeShape {
     return row - 1 + (node.index & (row - 1));
   }
   [[nodiscard]] std::size_t slots() const { return (std::size_t{1} << page_levels()) - 1; }
-  /// Calls visit(node) for each node of a page, the root first. The page's other slots are unused.
-  template <class Visit>
-  void for_each_node(std::uint64_t page, const Visit& visit) const {
-    const NodeId root = root_of(page);
-    const int lowest = root.level / page_levels() * page_levels();
-    for (int level = root.level; level >= lowest; --level) {
-      const std::uint64_t width = std::uint64_t{1} << (root.level - level);
-      const std::uint64_t first = root.index * width;
-      const std::uint64_t end = std::min<std::uint64_t>(first + width, nodes_on(level));
-      for (std::uint64_t i = first; i < end; ++i)
-        visit(NodeId{static_cast<std::uint8_t>(level), static_cast<std::uint32_t>(i)});
-    }
-  }
 
   // --- Bytes ---
   [[nodiscard]] std::size_t block_bytes() const { return packed_block_bytes(degree_); }
@@ -157,5 +139,25 @@ class TreeShape {
   std::array<std::uint64_t, 8> first_page_{};  // by band
   std::uint64_t pages_;
 };
+
+/// The node that a page refines. The page is not that of the root.
+inline NodeId refined_by(const TreeShape& shape, std::uint64_t page) {
+  const NodeId root = shape.root_of(page);
+  return {static_cast<std::uint8_t>(root.level + 1), root.index / 2};
+}
+
+/// Calls visit(node) for each node of a page, the root first. The page's other slots are unused.
+template <class Visit>
+void for_each_node_in(const TreeShape& shape, std::uint64_t page, const Visit& visit) {
+  const NodeId root = shape.root_of(page);
+  const int lowest = root.level / shape.page_levels() * shape.page_levels();
+  for (int level = root.level; level >= lowest; --level) {
+    const std::uint64_t width = std::uint64_t{1} << (root.level - level);
+    const std::uint64_t first = root.index * width;
+    const std::uint64_t end = std::min<std::uint64_t>(first + width, shape.nodes_on(level));
+    for (std::uint64_t i = first; i < end; ++i)
+      visit(NodeId{static_cast<std::uint8_t>(level), static_cast<std::uint32_t>(i)});
+  }
+}
 
 }  // namespace catgs

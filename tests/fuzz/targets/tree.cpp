@@ -152,7 +152,7 @@ void require_sound_stores(TreeFile& tree) {
            std::isfinite(c.half_extent.x + c.half_extent.y + c.half_extent.z);
   };
   for (const auto& page : table.pages())
-    table.shape().for_each_node(page->page, [&](NodeId node) {
+    for_each_node_in(table.shape(), page->page, [&](NodeId node) {
       const std::uint32_t c = table.cluster_of(node, table.shape().slots());
       require(finite(stores.on_host.store().clusters()[c]), "bounds on the host are finite");
       require(finite(stores.clusters[table.cluster_of(node, cuda::clusters_per_slot)]),
@@ -160,13 +160,13 @@ void require_sound_stores(TreeFile& tree) {
     });
   const std::vector<cuda::PageEntry> entries = cuda::entries_of(table);
   const Camera camera = make_camera({}, {64, 48}, 50.0f);
-  const cuda::TreeCut cut{.tree = {entries.data(), static_cast<std::uint32_t>(entries.size()),
-                                   stores.errors.data()},
-                          .now = CutEye(camera),
-                          .end = CutEye(camera),
-                          .detail_px = 1.0f,
-                          .now_s = 1.0,
-                          .share = nullptr};
+  const cuda::TreeCut cut{
+      .tree = {entries.data(), static_cast<std::uint32_t>(entries.size()), stores.errors.data()},
+      .now = CutEye(camera),
+      .end = CutEye(camera),
+      .detail_px = 1.0f,
+      .now_s = 1.0,
+      .share = nullptr};
   for (std::uint32_t n = 0; n < cut.tree.nodes(); ++n) {
     const float share = cut.share_of(stores.clusters.data(), n);
     require(share >= 0.0f && share <= 1.0f, "a share on the device is a share");

@@ -29,8 +29,7 @@ TEST(PageSlots, SlotsThatTheTreeHasNotAreNotRead) {
   slots.put(0, page, 0);
   const auto clusters = slots.store().clusters();
   EXPECT_EQ(clusters[0].centre, glm::vec3(1, 2, 3));
-  for (std::size_t c = 1; c < shape.slots(); ++c)
-    EXPECT_EQ(clusters[c].centre, glm::vec3(0)) << c;
+  for (std::size_t c = 1; c < shape.slots(); ++c) EXPECT_EQ(clusters[c].centre, glm::vec3(0)) << c;
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ class SomePages {
     for (std::uint64_t p = 1; p < shown_.size(); ++p) {
       const bool second = shape().root_of(p).index % 2 == 1;
       shown_[p] = second ? shown_[p - 1]
-                         : shown(shape().refined_by(p)) *
+                         : shown(refined_by(shape(), p)) *
                                std::uniform_real_distribution<float>(0, 1)(random);
     }
   }

@@ -304,8 +304,8 @@ TEST_F(PagedTreeTest, DamagedPagesCostDetailOfTheirTreeOnly) {
 
 TEST_F(PagedTreeTest, PagesThatExceedTheNodeAboveAreNotUsed) {
   Slots slots(64);
-  Looked forged(slots, tree_of(with_page(
-                           bytes_, 1, [](TreePage& page) { page.facts(0).error = 1e8f; })));
+  Looked forged(slots,
+                tree_of(with_page(bytes_, 1, [](TreePage& page) { page.facts(0).error = 1e8f; })));
   forged.settle(camera_at(0, -6));
   EXPECT_EQ(forged.tree.figures().unreadable, 1u);
   EXPECT_EQ(forged.tree.table()->find(1), nullptr);

@@ -144,7 +144,7 @@ TEST_F(TreeFileTest, UnusedBytesOfPagesAreZeros) {
 
 TEST_F(TreeFileTest, ErrorsAndBoundsGrowTowardsTheRoot) {
   const std::uint64_t leaves = shape_.page_of({0, 0});
-  const auto error = [&](const std::function<void(NodeFacts& above, NodeFacts& node)>& change) {
+  const auto error = [&](const std::function<void(NodeFacts & above, NodeFacts & node)>& change) {
     return fault_with(leaves, [&](TreePage& page) { change(page.facts(1), page.facts(3)); });
   };
   EXPECT_THAT(error([](auto& above, auto& node) { node.error = 2.0f * above.error; }),

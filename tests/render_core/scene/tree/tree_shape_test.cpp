@@ -50,7 +50,7 @@ TEST(TreeShape, ThePagesHaveEachNodeOnce) {
       const TreeShape shape(leaves * cluster_size - 7, degree);
       std::set<std::pair<int, std::uint32_t>> nodes;
       for (std::uint64_t page = 0; page < shape.pages(); ++page)
-        shape.for_each_node(page, [&](NodeId node) {
+        for_each_node_in(shape, page, [&](NodeId node) {
           ASSERT_EQ(shape.page_of(node), page);
           ASSERT_EQ(shape.slot_of(node) == 0, node == shape.root_of(page));
           ASSERT_LT(node.index, shape.nodes_on(node.level));
@@ -60,7 +60,7 @@ TEST(TreeShape, ThePagesHaveEachNodeOnce) {
       for (int level = 0; level < shape.levels(); ++level) count += shape.nodes_on(level);
       EXPECT_EQ(nodes.size(), count);
       for (std::uint64_t page = 1; page < shape.pages(); ++page)
-        EXPECT_LT(shape.page_of(shape.refined_by(page)), page);
+        EXPECT_LT(shape.page_of(refined_by(shape, page)), page);
     }
 }
 
