@@ -52,7 +52,7 @@ inline bool drawn_or_refused(RendererKind kind, std::string bytes) {
     const auto renderer = make_renderer(tree, options).renderer;
     for (const Pipeline pipeline : {Pipeline::exact, Pipeline::catgs}) {
       const auto view = renderer->make_view({.pipeline = pipeline});
-      for (const auto [distance, detail_px] :
+      for (const auto& [distance, detail_px] :
            {std::pair(3.0f, 0.0f), {3.1f, 2.0f}, {60.0f, 0.0f}}) {
         const Rendered drawn = render_in(*view, tree_request(distance, detail_px));
         EXPECT_TRUE(
