@@ -88,12 +88,16 @@ std::uint64_t TreeFile::pages_in_file() const {
   return std::min(shape_.pages(), (size - TreeShape::header_bytes) / shape_.page_bytes());
 }
 
+std::unique_ptr<const TreePage> TreeFile::read(std::uint64_t number, const NodeFacts* above) const {
+  auto page = std::make_unique<TreePage>(shape_);
+  file_->read(shape_.page_offset(number), page->bytes());
+  page->check(number, file_->name(), above);
+  return page;
+}
+
 std::unique_ptr<const TreePage> TreeFile::page(std::uint64_t number, const NodeFacts* above) {
   try {
-    auto page = std::make_unique<TreePage>(shape_);
-    file_->read(shape_.page_offset(number), page->bytes());
-    page->check(number, file_->name(), above);
-    return page;
+    return read(number, above);
   } catch (const InputError& e) {
     const std::lock_guard lock(mutex_);
     if (damaged_.empty()) first_damage_ = e.what();

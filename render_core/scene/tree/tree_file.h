@@ -67,8 +67,11 @@ class TreeFile {
   /// Less than shape().pages() where the file is cut off.
   [[nodiscard]] std::uint64_t pages_in_file() const;
 
-  /// A page of [0, shape().pages()); null if it is damaged or missing. `above`: of the node that
-  /// the page refines, whose error and bounds the page must not exceed.
+  /// A page of [0, shape().pages()). `above`: of the node that the page refines, whose error and
+  /// bounds the page must not exceed. Throws InputError if it is damaged or missing.
+  [[nodiscard]] std::unique_ptr<const TreePage> read(std::uint64_t number,
+                                                     const NodeFacts* above = nullptr) const;
+  /// The same, but null if it is damaged or missing. damage() counts it.
   std::unique_ptr<const TreePage> page(std::uint64_t number, const NodeFacts* above = nullptr);
 
   struct Damage {
