@@ -1,31 +1,17 @@
 #include <algorithm>
-#include <cstring>
 #include <limits>
-#include <unordered_map>
 #include <utility>
 
 #include "render_core/cuda/device_pages.cuh"
+#include "render_core/cuda/page_upload.h"
 #include "render_core/scene/tree/page_pools.h"
 
 namespace catgs::cuda {
 namespace {
 
-constexpr double never_s = std::numeric_limits<double>::infinity();
-
 /// Numbers of Gaussians have 32 bits.
 constexpr std::uint32_t most_slots =
     std::numeric_limits<std::uint32_t>::max() / (clusters_per_slot * cluster_size);
-
-/// The largest level of log2_opacity, which is below visibility.
-constexpr std::uint16_t invisible = 65535;
-
-/// Kernels draw all Gaussians of a block, so those that the node does not have become invisible.
-void hide_rest(std::byte* block, std::size_t count) {
-  for (std::size_t i = count; i < cluster_size; ++i)
-    std::memcpy(block + packed_offset(0, 16, static_cast<std::uint32_t>(i)) +
-                    offsetof(PackedGeometry, log2_opacity),
-                &invisible, sizeof invisible);
-}
 
 /// Chunks are aligned as device memory is.
 std::size_t chunk_bytes_for(std::size_t block_bytes) { return (block_bytes + 255) / 256 * 256; }
@@ -55,11 +41,6 @@ std::shared_ptr<DevicePool> pool_for(const TreeShape& shape, const RendererOptio
                      PagePools::settling_turns);
   };
   return std::static_pointer_cast<DevicePool>(options.pages->on(device, make));
-}
-
-/// Rows of nodes above the last one of the pages of a band.
-int rows_above_bottom(const TreeShape& shape, int band) {
-  return shape.top_level(band) - band * shape.page_levels();
 }
 
 }  // namespace
@@ -97,31 +78,19 @@ TreeArrays DevicePages::tree(const PageTable& table) const {
           .errors = pool_.errors()};
 }
 
-void DevicePages::put(std::uint32_t slot, const TreePage& page, std::uint64_t /*number*/) {
+void DevicePages::put(std::uint32_t slot, const TreePage& page, std::uint64_t number) {
   check(cudaSetDevice(device_), "device");
-  const std::size_t nodes = shape_.slots(), first = std::size_t{slot} * clusters_per_slot;
-  const auto whole = page.bytes().subspan(shape_.block_offset(0), nodes * shape_.block_bytes());
-  std::vector<std::byte> blocks(whole.begin(), whole.end());
-  std::vector<PackedUnits> units(clusters_per_slot);
-  std::vector<Cluster> clusters(clusters_per_slot);
-  std::vector<float> errors(clusters_per_slot, -1.0f);
-  for (std::size_t s = 0; s < nodes; ++s) {
-    const NodeFacts& facts = page.facts(s);
-    if (facts.count == 0) continue;
-    units[s] = facts.units;
-    clusters[s] = facts.bounds;
-    errors[s] = facts.error;
-    hide_rest(blocks.data() + s * shape_.block_bytes(), facts.count);
-  }
+  const PageUpload upload(shape_, page, number);
+  const std::size_t first = std::size_t{slot} * clusters_per_slot;
   const auto copy = [&](auto* target, const auto& source) {
     check(cudaMemcpyAsync(target, source.data(), source.size() * sizeof(source[0]),
                           cudaMemcpyHostToDevice, stream_.get()),
           "page upload");
   };
-  copy(pool_.memory().blocks.get() + slot * pool_.chunk_bytes(), blocks);
-  copy(pool_.memory().units.get() + first, units);
-  copy(pool_.memory().clusters.get() + first, clusters);
-  copy(pool_.errors() + first, errors);
+  copy(pool_.memory().blocks.get() + slot * pool_.chunk_bytes(), upload.blocks);
+  copy(pool_.memory().units.get() + first, upload.units);
+  copy(pool_.memory().clusters.get() + first, upload.clusters);
+  copy(pool_.errors() + first, upload.errors);
 }
 
 std::unique_ptr<DevicePages::Entries> DevicePages::take_entries() {
@@ -135,38 +104,6 @@ std::unique_ptr<DevicePages::Entries> DevicePages::take_entries() {
   }
   auto entries = std::make_unique<Entries>();
   entries->reserve(most_pages_);
-  return entries;
-}
-
-/// In the order of the pages' numbers, so that the order of equal depths does not depend on slots.
-std::vector<PageEntry> DevicePages::entries_of(const PageTable& table) const {
-  std::vector<const PageInSlot*> pages;
-  for (const auto& page : table.pages()) pages.push_back(page.get());
-  std::ranges::sort(pages, {}, &PageInSlot::page);
-  std::unordered_map<std::uint64_t, std::size_t> place_of;
-  for (std::size_t i = 0; i < pages.size(); ++i) place_of[pages[i]->page] = i;
-  std::vector<PageEntry> entries(pages.size());
-  for (std::size_t i = 0; i < pages.size(); ++i) {
-    const PageInSlot& page = *pages[i];
-    const int band = shape_.band_of_page(page.page);
-    entries[i] = {.shown_since_s = page.shown_since_s,
-                  .below_since_s = {},
-                  .slot = page.slot,
-                  .above = PageEntry::no_node,
-                  .first_bottom = (1u << rows_above_bottom(shape_, band)) - 1u,
-                  .top_level = static_cast<std::uint32_t>(shape_.top_level(band))};
-    std::ranges::fill(entries[i].below_since_s, never_s);
-  }
-  for (std::size_t i = 0; i < pages.size(); ++i) {
-    const PageInSlot* above = table.above(pages[i]->page);
-    if (above == nullptr) continue;
-    const NodeId root = shape_.root_of(pages[i]->page);
-    const auto refined = static_cast<std::uint32_t>(
-        shape_.slot_of({static_cast<std::uint8_t>(root.level + 1), root.index / 2}));
-    entries[i].above = above->slot * clusters_per_slot + refined;
-    PageEntry& entry_above = entries[place_of.at(above->page)];
-    entry_above.below_since_s[refined - entry_above.first_bottom] = pages[i]->shown_since_s;
-  }
   return entries;
 }
 

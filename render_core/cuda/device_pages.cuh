@@ -7,7 +7,7 @@
 
 #include "render_core/cuda/device_scene.cuh"
 #include "render_core/cuda/stream.h"
-#include "render_core/cuda/tree_cut.cuh"
+#include "render_core/cuda/tree_cut.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/scene/tree/paged_tree.h"
 
@@ -53,7 +53,6 @@ class DevicePages final : public PageStore {
     std::vector<std::unique_ptr<Entries>> buffers;
   };
   std::unique_ptr<Entries> take_entries();
-  [[nodiscard]] std::vector<PageEntry> entries_of(const PageTable& table) const;
 
   const TreeShape& shape_;
   const DevicePool& pool_;

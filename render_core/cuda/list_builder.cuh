@@ -6,7 +6,7 @@
 #include "render_core/cuda/sort.cuh"
 #include "render_core/cuda/splat.cuh"
 #include "render_core/cuda/stream.h"
-#include "render_core/cuda/tree_cut.cuh"
+#include "render_core/cuda/tree_cut.h"
 #include "render_core/cuda/view_memory.cuh"
 #include "render_core/motion/list_culler.h"
 

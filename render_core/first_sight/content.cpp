@@ -90,15 +90,18 @@ Content find_content(const VoxelGrid& grid, const Bounds& core) {
 /// camera stands at the crossing of the two lines that bound it: with A = max(x - k z) and B =
 /// max(-x - k z), both plus r sqrt(1 + k²), at cx = (A - B) / 2 and cz = -(A + B) / 2k. The same
 /// holds for y; the farther of the two distances counts.
+///
+/// Places are those around the content's middle: far from the origin, others have few digits.
 OuterView fit(const Content& content, const glm::vec3& forward, const glm::vec3& up) {
   constexpr float margin = 0.88f;
+  const glm::vec3 middle = 0.5f * (content.bounds.min + content.bounds.max);
   const Pose turned = look_at(glm::vec3(0), forward, up);
   const glm::mat3 to_camera = camera_from_world_rotation(turned);
   const float k[2] = {margin * half_width, margin * half_height};
   glm::vec2 high(std::numeric_limits<float>::lowest()), low = high;
   glm::vec2 depth(std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest());
   for (const glm::vec3& place : content.places) {
-    const glm::vec3 p = to_camera * place;
+    const glm::vec3 p = to_camera * (place - middle);
     depth = {std::min(depth.x, p.z), std::max(depth.y, p.z)};
     for (int axis = 0; axis < 2; ++axis) {
       const float ball = content.radius * std::sqrt(1.0f + k[axis] * k[axis]);
@@ -108,7 +111,7 @@ OuterView fit(const Content& content, const glm::vec3& forward, const glm::vec3&
   }
   const glm::vec2 centre = 0.5f * (high - low);
   const float z = std::min(-0.5f * (high.x + low.x) / k[0], -0.5f * (high.y + low.y) / k[1]);
-  return {{turned.orientation * glm::vec3(centre, z), turned.orientation},
+  return {{middle + turned.orientation * glm::vec3(centre, z), turned.orientation},
           depth.x - z,
           0.5f * (depth.x + depth.y) - z};
 }

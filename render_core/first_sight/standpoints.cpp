@@ -46,7 +46,10 @@ struct Surroundings {
 class Explorer {
  public:
   Explorer(const VoxelGrid& grid, const Bounds& box, const glm::vec3& up)
-      : grid_(grid), box_(box), up_(up), reach_(glm::distance(box.min, box.max)) {}
+      : grid_(grid),
+        box_(box),
+        up_(up),
+        reach_(std::max(glm::distance(box.min, box.max), grid.cell_size())) {}
 
   /// The surroundings of a free place above some ground; nothing for others.
   [[nodiscard]] std::optional<Surroundings> explore(const glm::vec3& place) const;

@@ -151,9 +151,11 @@ class Reader {
                                                 std::size_t bytes) const {
     std::vector<std::byte> tile(bytes);
     uLongf size = bytes;
-    const int result = uncompress(reinterpret_cast<Bytef*>(tile.data()), &size,
-                                  reinterpret_cast<const Bytef*>(packed.data()), packed.size());
-    require(result == Z_OK && size == bytes, "a tile", "cannot be unpacked");
+    uLong taken = packed.size();
+    const int result = uncompress2(reinterpret_cast<Bytef*>(tile.data()), &size,
+                                   reinterpret_cast<const Bytef*>(packed.data()), &taken);
+    require(result == Z_OK && size == bytes && taken == packed.size(), "a tile",
+            "cannot be unpacked");
     return tile;
   }
 

@@ -77,6 +77,14 @@ describe('the tiles of a map', () => {
     expect(tiles.at(1)).toEqual(second);
   });
 
+  it('are all checked before one is used', async () => {
+    const tiles = [flat(64), flat(64), [...flat(64), 0]];
+    await expect(new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check()).rejects.toThrow('a tile');
+    tiles[2]!.pop();
+    await expect(new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check()).resolves.toBeUndefined();
+    await expect(new PackedTiles(64 * 3, 1, 64 * 3 - 1, packed(tiles)).check()).rejects.toThrow('places');
+  });
+
   it('are refused where the index is not theirs, without memory for what it names', () => {
     const right = packed([six]);
     for (const [at, value] of [[0, 4], [0, 500], [4, 0], [4, 2 ** 31]] as const) {

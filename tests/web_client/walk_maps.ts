@@ -5,7 +5,7 @@ import golden from '../support/walk_golden.json';
 
 /** Stairs up to a floor, beside walls (walk_golden_test.cpp). Units are metres, z is up. */
 export const file = Uint8Array.from(Buffer.from(golden.file, 'hex'));
-export const map = read_walk_file(file.buffer);
+export const map = await read_walk_file(file.buffer);
 
 /** Marsaglia's xorshift, 0…1. */
 export function random_from(seed: number): () => number {

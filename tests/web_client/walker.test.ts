@@ -1,6 +1,7 @@
 // The client's reader, walker and paths against those of render_core/walk (walk_golden_test.cpp).
 import { describe, expect, it } from 'vitest';
 import { find_path } from '#client/walk/path';
+import { tiles_in } from '#client/walk/tiles';
 import { clear_at, eyes_of, read_walk_file, storey_at, type Stand, type WalkMap } from '#client/walk/walk_map';
 import { move, stand_below, straight } from '#client/walk/walker';
 import golden from '../support/walk_golden.json';
@@ -32,35 +33,53 @@ describe('a walk file', () => {
     expect(is_clear(map, map.start)).toBe(true);
   });
 
-  it('is refused where it is cut off or changed', () => {
+  it('is refused where it is cut off or changed', async () => {
     for (let size = 0; size < file.length; size += size < 330 ? 1 : 29)
-      expect(() => read_walk_file(file.slice(0, size).buffer)).toThrow('walk file');
+      await expect(read_walk_file(file.slice(0, size).buffer)).rejects.toThrow('walk file');
     for (let k = 0; k < file.length; k += 3) {
       const changed = file.slice();
       changed[k]! ^= 16;
-      expect(() => read_walk_file(changed.buffer), String(k)).toThrow('walk file');
+      await expect(read_walk_file(changed.buffer), String(k)).rejects.toThrow('walk file');
     }
   }, 60_000);
 
-  it('is refused where its header or its index is forged', () => {
-    const forged = (field: string, write: (view: DataView) => void): void => {
+  it('whose tiles are forged behind the checksum is refused when it is read, or never', async () => {
+    const tiles = tiles_in(map.tiles.width, map.tiles.depth);
+    expect(tiles).toBeGreaterThan(1);
+    let refused = 0;
+    for (let k = 320 + 8 * tiles; k < file.length; ++k) {
+      const changed = file.slice();
+      changed[k]! ^= 1 << k % 8;
+      const forged = await read_walk_file(seal(changed)).catch((error: unknown) => {
+        expect(String(error)).toContain('walk file');
+        ++refused;
+        return undefined;
+      });
+      for (let t = 0; forged && t < tiles; ++t) expect(() => forged.tiles.at(t), String(k)).not.toThrow();
+    }
+    expect(refused).toBeGreaterThan(0);
+  }, 60_000);
+
+  it('is refused where its header or its index is forged', async () => {
+    const forged = async (field: string, write: (view: DataView) => void): Promise<void> => {
       const changed = file.slice();
       write(new DataView(changed.buffer));
-      expect(() => read_walk_file(seal(changed)), field).toThrow(field);
+      await expect(read_walk_file(seal(changed)), field).rejects.toThrow(field);
     };
-    forged('version', (view) => view.setUint32(8, 1, true));
-    forged('origin', (view) => view.setFloat32(16, NaN, true));
-    forged('axes', (view) => view.setFloat32(28, 0.5, true));
-    forged('cell', (view) => view.setFloat32(64, 0, true));
-    forged('person', (view) => view.setFloat32(76, -1, true));
-    forged('start', (view) => view.setFloat32(92, 2000, true));
-    forged('size', (view) => view.setUint32(104, 5000, true));
-    forged('places', (view) => view.setUint32(112, 0xffffffff, true));
-    forged('tile side', (view) => view.setUint32(116, 32, true));
-    forged('packed bytes', (view) => view.setUint32(120, view.getUint32(120, true) - 1, true));
-    forged('storeys', (view) => view.setUint32(124, 17, true));
-    forged('storeys', (view) => view.setFloat32(128, NaN, true));
-    forged('index', (view) => view.setUint32(320, view.getUint32(320, true) + 1, true));
+    await forged('version', (view) => view.setUint32(8, 1, true));
+    await forged('origin', (view) => view.setFloat32(16, NaN, true));
+    await forged('axes', (view) => view.setFloat32(28, 0.5, true));
+    await forged('cell', (view) => view.setFloat32(64, 0, true));
+    await forged('person', (view) => view.setFloat32(76, -1, true));
+    await forged('start', (view) => view.setFloat32(92, 2000, true));
+    await forged('size', (view) => view.setUint32(104, 5000, true));
+    await forged('places', (view) => view.setUint32(112, 0xffffffff, true));
+    await forged('tile side', (view) => view.setUint32(116, 32, true));
+    await forged('packed bytes', (view) => view.setUint32(120, view.getUint32(120, true) - 1, true));
+    await forged('storeys', (view) => view.setUint32(124, 17, true));
+    await forged('storeys', (view) => view.setFloat32(128, NaN, true));
+    await forged('places', (view) => view.setUint32(112, view.getUint32(112, true) - 1, true));
+    await forged('index', (view) => view.setUint32(320, view.getUint32(320, true) + 1, true));
   });
 });
 

@@ -93,7 +93,7 @@ float floor_size(const std::vector<Facet>& facets, const glm::vec3& up) {
   };
   std::array<float, levels> area{};
   const auto level_of = [&](float height) {
-    return std::clamp(static_cast<int>(height * levels), 0, levels - 1);
+    return static_cast<int>(std::clamp(height * levels, 0.0f, levels - 1.0f));
   };
   for (const Facet& f : facets)
     if (std::abs(glm::dot(f.normal, up)) > horizontal)
@@ -105,9 +105,9 @@ float floor_size(const std::vector<Facet>& facets, const glm::vec3& up) {
     const glm::vec3 p = place(f);
     if (std::abs(glm::dot(f.normal, up)) < horizontal || std::abs(level_of(p.z) - floor) > 1)
       continue;
-    const glm::ivec2 cell(static_cast<float>(plan) * glm::vec2(p));
-    if (cell.x >= 0 && cell.x < plan && cell.y >= 0 && cell.y < plan)
-      covered[static_cast<std::size_t>(cell.y * plan + cell.x)] = 1;
+    if (!(p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f)) continue;
+    const glm::ivec2 cell = glm::min(glm::ivec2(static_cast<float>(plan) * glm::vec2(p)), plan - 1);
+    covered[static_cast<std::size_t>(cell.y * plan + cell.x)] = 1;
   }
   const float share = static_cast<float>(std::ranges::count(covered, 1)) / (plan * plan);
   const float smallest = std::min({extent.x, extent.y, extent.z});

@@ -81,13 +81,16 @@ float VoxelGrid::depth_around(const glm::vec3& position) const {
 float VoxelGrid::distance_along(const glm::vec3& from, const glm::vec3& ray) const {
   constexpr float half_stopped = 0.6931472f;  // ln 2
   float stopped = 0.0f;
-  for (int step = 1;; ++step) {
+  // Far from the origin a step may be lost in rounding, so that the ray never leaves.
+  const int most_steps = size_.x + size_.y + size_.z;
+  for (int step = 1; step <= most_steps; ++step) {
     const float distance = static_cast<float>(step) * cell_size_;
     const float* cell = cell_at(from + distance * ray);
     if (!cell) return never;
     stopped += *cell;
     if (stopped > half_stopped) return distance;
   }
+  return never;
 }
 
 }  // namespace catgs

@@ -162,10 +162,8 @@ PageOfTree PageChoice::family_of(const PageOfTree& page) const {
 
 std::optional<PageOfTree> PageChoice::above(const PageOfTree& first) const {
   const TreeShape& shape = *trees_.at(first.tree);
-  const NodeId root = shape.root_of(first.page);
-  if (root == shape.root()) return std::nullopt;
-  const NodeId node{static_cast<std::uint8_t>(root.level + 1), root.index / 2};
-  const PageOfTree up = family_of({first.tree, shape.page_of(node)});
+  if (shape.root_of(first.page) == shape.root()) return std::nullopt;
+  const PageOfTree up = family_of({first.tree, shape.page_of(refined_by(shape, first.page))});
   if (shape.root_of(up.page) == shape.root()) return std::nullopt;
   return up;
 }

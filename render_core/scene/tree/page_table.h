@@ -40,9 +40,13 @@ class PageTable {
   }
   /// The page above a page: it holds the node that the page refines. Null for the root's.
   [[nodiscard]] const PageInSlot* above(std::uint64_t page) const {
-    const NodeId root = shape_->root_of(page);
-    if (root == shape_->root()) return nullptr;
-    return find(shape_->page_of({static_cast<std::uint8_t>(root.level + 1), root.index / 2}));
+    if (shape_->root_of(page) == shape_->root()) return nullptr;
+    return find(shape_->page_of(refined_by(*shape_, page)));
+  }
+  /// The facts of the node that a page refines. Null for the root's page.
+  [[nodiscard]] const NodeFacts* facts_above(std::uint64_t page) const {
+    const PageInSlot* above = this->above(page);
+    return above ? &above->facts[shape_->slot_of(refined_by(*shape_, page))] : nullptr;
   }
   /// When a page is shown that is shown no earlier than the page above.
   [[nodiscard]] double shown_since_above(std::uint64_t page) const {

@@ -168,7 +168,7 @@ PagedTree::Page PagedTree::read(std::uint64_t number, std::uint32_t slot) {
                                         store->release(slot);
                                         free->give_back(slot);
                                       });
-  const std::unique_ptr<const TreePage> bytes = file_->page(number);
+  const std::unique_ptr<const TreePage> bytes = file_->page(number, table_->facts_above(number));
   if (!bytes) return nullptr;
   store_.put(slot, *bytes, number);
   auto page = std::make_shared<PageInSlot>();

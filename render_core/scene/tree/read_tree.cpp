@@ -48,11 +48,13 @@ void for_each_node(TreeFile& tree, std::span<const NodeId> nodes, const LoadCont
 
 }  // namespace
 
-void require_root(TreeFile& tree) {
-  if (!tree.page(0))
+void require_root(const TreeFile& tree) {
+  try {
+    (void)tree.read(0);
+  } catch (const InputError& error) {
     throw InputError(tree.name(), "page 0",
-                     "is damaged or missing, and nothing can be seen without it",
-                     "convert the scene again");
+                     fmt::format("nothing can be seen without it: {}", error.what()));
+  }
 }
 
 GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes,

@@ -15,7 +15,7 @@ namespace catgs {
 struct SceneFormat;
 
 /// Throws InputError if the root's page is damaged or missing: nothing can be seen without it.
-void require_root(TreeFile& tree);
+void require_root(const TreeFile& tree);
 
 /// The Gaussians of nodes, in their order, as packed. Rotations and scales are the axes of the
 /// packed covariances. Throws InputError if a page is damaged.

@@ -25,6 +25,9 @@ void check_levels(const ByteSource& file, const TreeHeader& header) {
   }
   if (header.levels[0].gaussians != header.gaussians)
     throw InputError(file.name(), "level 0", "has another number of Gaussians than the tree");
+  for (auto l = static_cast<std::size_t>(shape.levels()); l < header.levels.size(); ++l)
+    if (header.levels[l] != TreeLevel{})
+      throw InputError(file.name(), fmt::format("level {}", l), "is above the root");
 }
 
 }  // namespace
@@ -85,12 +88,16 @@ std::uint64_t TreeFile::pages_in_file() const {
   return std::min(shape_.pages(), (size - TreeShape::header_bytes) / shape_.page_bytes());
 }
 
-std::unique_ptr<const TreePage> TreeFile::page(std::uint64_t number) {
+std::unique_ptr<const TreePage> TreeFile::read(std::uint64_t number, const NodeFacts* above) const {
+  auto page = std::make_unique<TreePage>(shape_);
+  file_->read(shape_.page_offset(number), page->bytes());
+  page->check(number, file_->name(), above);
+  return page;
+}
+
+std::unique_ptr<const TreePage> TreeFile::page(std::uint64_t number, const NodeFacts* above) {
   try {
-    auto page = std::make_unique<TreePage>(shape_);
-    file_->read(shape_.page_offset(number), page->bytes());
-    page->check(number, file_->name());
-    return page;
+    return read(number, above);
   } catch (const InputError& e) {
     const std::lock_guard lock(mutex_);
     if (damaged_.empty()) first_damage_ = e.what();

@@ -17,6 +17,8 @@ namespace catgs {
 struct TreeLevel {
   std::uint64_t gaussians = 0;
   float mean_error = 0.0f, max_error = 0.0f;  // of its nodes, world units
+
+  bool operator==(const TreeLevel&) const = default;
 };
 
 /// The first bytes of a .tree file, little-endian; pages follow at byte 4096 (TreeShape).
@@ -65,8 +67,12 @@ class TreeFile {
   /// Less than shape().pages() where the file is cut off.
   [[nodiscard]] std::uint64_t pages_in_file() const;
 
-  /// A page of [0, shape().pages()); null if it is damaged or missing.
-  std::unique_ptr<const TreePage> page(std::uint64_t number);
+  /// A page of [0, shape().pages()). `above`: of the node that the page refines, whose error and
+  /// bounds the page must not exceed. Throws InputError if it is damaged or missing.
+  [[nodiscard]] std::unique_ptr<const TreePage> read(std::uint64_t number,
+                                                     const NodeFacts* above = nullptr) const;
+  /// The same, but null if it is damaged or missing. damage() counts it.
+  std::unique_ptr<const TreePage> page(std::uint64_t number, const NodeFacts* above = nullptr);
 
   struct Damage {
     std::uint64_t pages = 0;  // that were asked for and could not be used

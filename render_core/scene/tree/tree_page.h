@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -16,7 +17,8 @@ namespace catgs {
 ///   4   60 zeros
 ///   64  NodeFacts of each slot, then the packed block of each slot (scene/packed_gaussian.h)
 ///
-/// Slots that the tree does not have are zeros. Blocks are as the CUDA core reads them.
+/// All that the tree's shape does not use is zeros: slots without a node, records of a block behind
+/// its node's count, and the page's end. Blocks are as the CUDA core reads them.
 class TreePage {
  public:
   /// A page of zeros. `shape` must outlive the page.
@@ -41,10 +43,15 @@ class TreePage {
   void seal(std::uint64_t number);
   /// Throws InputError that names `file`, the page's offset and what is wrong: the checksum, or a
   /// value that no core may meet. Afterwards the bytes may be uploaded as they are: counts are in
-  /// range, errors are finite and grow towards the root, means lie in their node's bounds.
-  void check(std::uint64_t number, std::string_view file) const;
+  /// range, errors and bounds are finite and grow towards the root, means lie in their node's
+  /// bounds, and unused bytes are zeros. `above`: of the node that the page refines, if it is
+  /// known.
+  void check(std::uint64_t number, std::string_view file, const NodeFacts* above = nullptr) const;
 
  private:
+  /// Names the first unused bytes that are not zeros; empty if there are none. `used`: a bit for
+  /// each slot with a node.
+  [[nodiscard]] std::string unused_fault(std::uint32_t used) const;
   [[nodiscard]] std::uint32_t checksum(std::uint64_t number) const;
 
   const TreeShape* shape_;

@@ -140,4 +140,24 @@ class TreeShape {
   std::uint64_t pages_;
 };
 
+/// The node that a page refines. The page is not that of the root.
+inline NodeId refined_by(const TreeShape& shape, std::uint64_t page) {
+  const NodeId root = shape.root_of(page);
+  return {static_cast<std::uint8_t>(root.level + 1), root.index / 2};
+}
+
+/// Calls visit(node) for each node of a page, the root first. The page's other slots are unused.
+template <class Visit>
+void for_each_node_in(const TreeShape& shape, std::uint64_t page, const Visit& visit) {
+  const NodeId root = shape.root_of(page);
+  const int lowest = root.level / shape.page_levels() * shape.page_levels();
+  for (int level = root.level; level >= lowest; --level) {
+    const std::uint64_t width = std::uint64_t{1} << (root.level - level);
+    const std::uint64_t first = root.index * width;
+    const std::uint64_t end = std::min<std::uint64_t>(first + width, shape.nodes_on(level));
+    for (std::uint64_t i = first; i < end; ++i)
+      visit(NodeId{static_cast<std::uint8_t>(level), static_cast<std::uint32_t>(i)});
+  }
+}
+
 }  // namespace catgs

@@ -1,5 +1,6 @@
 // Scenes in pages in the CPU core.
 
+#include "tests/support/forged_trees.h"
 #include "tests/support/tree_views.h"
 
 namespace catgs {
@@ -16,6 +17,13 @@ TEST(TreeViews, ShortMemoryIsCoarser) { test::expect_short_memory_to_be_coarser(
 TEST(TreeViews, SubFramesKeepTheCut) { test::expect_sub_frames_to_keep_the_cut(kind); }
 TEST(TreeViews, TreesShareAPool) { test::expect_trees_to_share_a_pool(kind); }
 TEST(TreeViews, AViewAtRestSettles) { test::expect_a_resting_view_to_settle(kind); }
+TEST(TreeViews, UnusedSlotsThatClaimToBeUsedAreRefused) {
+  test::expect_unused_slots_to_be_refused(kind);
+}
+TEST(TreeViews, ExtremePagesAreDrawn) { test::expect_extreme_pages_to_be_drawn(kind); }
+TEST(TreeViews, RandomPagesAreDrawnOrRefused) {
+  test::expect_random_pages_to_be_drawn_or_refused(kind, 60);
+}
 TEST(TreeViews, VanillaIsRefused) { test::expect_vanilla_to_be_refused(kind); }
 
 TEST(TreeViews, TheReferenceDrawsNoParts) {

@@ -1,6 +1,7 @@
 // Scenes in pages in the CUDA core; needs a device.
 
 #include "tests/render_core/cuda/device.h"
+#include "tests/support/forged_trees.h"
 #include "tests/support/tree_views.h"
 
 namespace catgs {
@@ -41,6 +42,21 @@ TEST(CudaFrames, TreesShareAPool) {
 TEST(CudaFrames, AViewAtRestSettles) {
   REQUIRE_DEVICE();
   test::expect_a_resting_view_to_settle(kind);
+}
+
+TEST(CudaFrames, UnusedSlotsThatClaimToBeUsedAreRefused) {
+  REQUIRE_DEVICE();
+  test::expect_unused_slots_to_be_refused(kind);
+}
+
+TEST(CudaFrames, ExtremePagesAreDrawn) {
+  REQUIRE_DEVICE();
+  test::expect_extreme_pages_to_be_drawn(kind);
+}
+
+TEST(CudaFrames, RandomPagesAreDrawnOrRefused) {
+  REQUIRE_DEVICE();
+  test::expect_random_pages_to_be_drawn_or_refused(kind, 60);
 }
 
 TEST(CudaFrames, VanillaIsRefusedForPages) {

@@ -8,7 +8,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/analysis/voxel_grid.h"
+#include "render_core/scene/files/sanitize.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/interiors.h"
 #include "tests/support/surface_clouds.h"
@@ -141,6 +143,45 @@ TEST(FirstSight, DegenerateCloudsGetAUsablePose) {
     EXPECT_GT(hints.near_z, 0.0f);
     EXPECT_LT(hints.limits.min.x, hints.limits.max.x);
   }
+}
+
+/// Small clouds of what sanitize() keeps: as far away as coordinates go, so that some axes have no
+/// extent, and with scales of any size.
+TEST(FirstSight, AnyCloudHasAView) {
+  ThreadPool pool(2);
+  std::mt19937 random(3);
+  const auto number = [&](float low, float high) {  // between powers of ten, of either sign
+    const float size = std::pow(10.0f, std::uniform_real_distribution(low, high)(random));
+    return random() % 2 == 0 ? size : -size;
+  };
+  for (int k = 0; k < 8; ++k) {
+    GaussianCloud cloud = random_cloud(1 + random() % 9, 0, static_cast<unsigned>(k));
+    const glm::vec3 far(number(-2, 9), number(-2, 9), number(-2, 9));
+    const float extent = std::abs(number(-9, 2));
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      cloud.mean[i] = extent * cloud.mean[i] + (k % 2 == 0 ? far : glm::vec3(0, far.y, 0));
+      cloud.scale[i] *= extent * std::abs(number(-3, 3));
+      if (k % 4 == 0) cloud.mean[i] *= std::abs(number(-9, 0));
+    }
+    sanitize(cloud, LoadContext(pool));
+    if (cloud.empty()) continue;
+    const SceneHints hints = estimate(cloud, find_up(cloud, {}));
+    const glm::vec3 place = hints.start_pose.position;
+    EXPECT_TRUE(std::isfinite(place.x + place.y + place.z)) << k;
+    EXPECT_NEAR(glm::length(hints.start_pose.orientation), 1.0f, 1e-3f) << k;
+    EXPECT_GT(hints.near_z, 0.0f) << k;
+    EXPECT_GT(hints.scale, 0.0f) << k;
+  }
+}
+
+/// Rays of a thin layer 10^9 units away, where no step of a cell's size changes a coordinate.
+TEST(FirstSight, RaysEndWhereStepsAreLostInRounding) {
+  GaussianCloud cloud = random_cloud(200, 0);
+  for (glm::vec3& mean : cloud.mean) mean = {1e-7f * mean.x, 1e9f, 1e-7f * mean.z};
+  for (glm::vec3& scale : cloud.scale) scale = glm::vec3(1e-10f);
+  for (float& opacity : cloud.opacity) opacity = 0.004f;
+  const SceneHints hints = estimate(cloud);
+  EXPECT_GT(hints.near_z, 0.0f);
 }
 
 }  // namespace

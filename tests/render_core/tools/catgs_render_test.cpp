@@ -358,7 +358,7 @@ TEST_F(CatgsRender, InfoRefusesATreeWithoutItsRoot) {
   std::filesystem::resize_file(path("ball.tree"), TreeShape::header_bytes + 100);
   const Outcome info = run("info " + path("ball.tree"));
   EXPECT_EQ(info.exit_code, 2);
-  EXPECT_THAT(info.out, HasSubstr("page 0: is damaged or missing"));
+  EXPECT_THAT(info.out, HasSubstr("page 0: nothing can be seen without it"));
 }
 
 TEST_F(CatgsRender, DrawsATreeFromItsPages) {

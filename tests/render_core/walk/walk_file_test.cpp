@@ -129,6 +129,18 @@ TEST(WalkFile, ForgedTilesAreRefused) {
   EXPECT_THAT(refused(""), HasSubstr("places: are more than the tiles have"));
 }
 
+TEST(WalkFile, BytesBehindATileAreRefused) {
+  std::string bytes = with(0, 'c') + std::string(5, 'x');
+  for (const std::size_t at : {std::size_t{120}, test::walk_header_bytes}) {
+    std::uint32_t size = 0;
+    std::memcpy(&size, bytes.data() + at, sizeof size);
+    size += 5;
+    std::memcpy(bytes.data() + at, &size, sizeof size);
+  }
+  test::seal(bytes);
+  EXPECT_THAT(refusal(bytes), HasSubstr("a tile: cannot be unpacked"));
+}
+
 /// A header and an index that name much more than the tiles can hold cost no memory.
 TEST(WalkFile, NoMoreIsUnpackedThanDeflateCanMake) {
   std::string bytes = with(112, 1u << 24);

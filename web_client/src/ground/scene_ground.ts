@@ -60,7 +60,7 @@ export class SceneGround {
   private async read(file: ArrayBuffer): Promise<WalkMap | undefined> {
     try {
       const { read_walk_file } = await import('../walk/walk_map');
-      return read_walk_file(file);
+      return await read_walk_file(file);
     } catch (error: unknown) {
       console.warn(error);
       return undefined;

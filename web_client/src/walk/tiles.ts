@@ -1,5 +1,6 @@
 // The columns of a WalkMap, unpacked where somebody needs them: a map of two million places takes its file's bytes.
 import { unzlibSync } from 'fflate';
+import { Breaths } from '../base/breaths';
 
 const tile_bits = 6;
 export const tile_side = 2 ** tile_bits; // columns
@@ -117,6 +118,17 @@ export class PackedTiles implements Tiles {
     }
     require(this.begin_[tiles] === this.bytes_.length, 'index');
     require(2 * count <= sum, 'places'); // a kind and a height each
+  }
+
+  /** Throws an Error where a tile cannot be read, so that at() never does. Lets the page draw meanwhile. */
+  async check(): Promise<void> {
+    const breaths = new Breaths();
+    let count = 0;
+    for (let t = 0; t < this.unpacked_.length; ++t) {
+      await breaths.take();
+      count += this.unpack(t).places.length;
+    }
+    require(count === this.count, 'places');
   }
 
   has(index: number): boolean {

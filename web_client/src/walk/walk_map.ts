@@ -140,8 +140,8 @@ function crc32(bytes: Uint8Array): number {
   return ~crc >>> 0;
 }
 
-/** Throws an Error that names the field that is wrong. */
-export function read_walk_file(file: ArrayBuffer): WalkMap {
+/** Throws an Error that names the field that is wrong, of the header or of any tile. Lets the page draw meanwhile. */
+export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
   require(file.byteLength > header_bytes && file.byteLength <= most_bytes, 'length');
   const view = new DataView(file);
   const word = (at: number): number => view.getUint32(at, true);
@@ -155,6 +155,7 @@ export function read_walk_file(file: ArrayBuffer): WalkMap {
   require(word(112) <= most_places, 'places');
   require(word(116) === tile_side, 'tile side');
   require(word(120) === file.byteLength - header_bytes, 'packed bytes');
+  const tiles = new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes));
   const map: WalkMap = {
     origin: triple(16),
     axes: [triple(28), triple(40), triple(52)],
@@ -164,9 +165,10 @@ export function read_walk_file(file: ArrayBuffer): WalkMap {
     chest: float(84) * cells_per_eye_height,
     start: { east: float(92), north: float(96), height: float(100) },
     storeys: read_storeys(word(124), (k) => triple(128 + 12 * k), word),
-    tiles: new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes)),
+    tiles,
   };
   require_sound(map);
+  await tiles.check();
   return map;
 }
 

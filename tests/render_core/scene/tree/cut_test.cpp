@@ -36,11 +36,10 @@ class SomePages {
   void blend_some(std::uint64_t seed) {
     std::mt19937_64 random(seed);
     for (std::uint64_t p = 1; p < shown_.size(); ++p) {
-      const NodeId root = shape().root_of(p);
-      const NodeId above{static_cast<std::uint8_t>(root.level + 1), root.index / 2};
-      const bool second = root.index % 2 == 1;
+      const bool second = shape().root_of(p).index % 2 == 1;
       shown_[p] = second ? shown_[p - 1]
-                         : shown(above) * std::uniform_real_distribution<float>(0, 1)(random);
+                         : shown(refined_by(shape(), p)) *
+                               std::uniform_real_distribution<float>(0, 1)(random);
     }
   }
   void keep_some(std::uint64_t seed, double share) {

@@ -302,6 +302,16 @@ TEST_F(PagedTreeTest, DamagedPagesCostDetailOfTheirTreeOnly) {
   EXPECT_TRUE(sound.cut(camera).missing.empty());
 }
 
+TEST_F(PagedTreeTest, PagesThatExceedTheNodeAboveAreNotUsed) {
+  Slots slots(64);
+  Looked forged(slots,
+                tree_of(with_page(bytes_, 1, [](TreePage& page) { page.facts(0).error = 1e8f; })));
+  forged.settle(camera_at(0, -6));
+  EXPECT_EQ(forged.tree.figures().unreadable, 1u);
+  EXPECT_EQ(forged.tree.table()->find(1), nullptr);
+  EXPECT_GT(forged.tree.table()->size(), 1u);
+}
+
 TEST_F(PagedTreeTest, ACoreThatFailsFailsTheNextFrame) {
   Slots slots(64);
   Looked looked(slots, tree());

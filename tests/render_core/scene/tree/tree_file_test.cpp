@@ -33,17 +33,10 @@ class TreeFileTest : public ::testing::Test {
     std::memcpy(bytes.data(), &header, sizeof header);
     return bytes;
   }
-  /// The tree with another page, whose checksum is right.
-  [[nodiscard]] std::string with_page(std::uint64_t number,
-                                      const std::function<void(TreePage&)>& change) const {
-    std::string bytes = bytes_;
-    TreePage page(shape_);
-    char* at = bytes.data() + shape_.page_offset(number);
-    std::memcpy(page.bytes().data(), at, page.bytes().size());
-    change(page);
-    page.seal(number);
-    std::memcpy(at, page.bytes().data(), page.bytes().size());
-    return bytes;
+  /// What is said about a page whose checksum is right.
+  [[nodiscard]] std::string fault_with(std::uint64_t number,
+                                       const std::function<void(TreePage&)>& change) const {
+    return fault(with_page(bytes_, number, change), number);
   }
   static TreeScene read(std::string bytes) {
     return read_tree(source_of(std::move(bytes)), two_threads());
@@ -81,6 +74,7 @@ TEST_F(TreeFileTest, HeaderFieldsAreChecked) {
            {[](auto& h) { h.levels[1].gaussians = 0; }, "level 1"},
            {[](auto& h) { h.levels[2].mean_error = -1.0f; }, "level 2"},
            {[](auto& h) { --h.levels[0].gaussians; }, "level 0"},
+           {[](auto& h) { h.levels[7].max_error = 1.0f; }, "level 7"},
        })
     EXPECT_EQ(where(with_header(header.change)), header.where);
   std::string flipped = bytes_;
@@ -104,14 +98,15 @@ TEST_F(TreeFileTest, ValuesOfPagesAreCheckedThoughTheirChecksumIsRight) {
            {[](auto& f) { f.bounds.centre.y = INFINITY; }, "bounds"},
            {[](auto& f) { f.bounds.half_extent.z *= 0.5f; }, "mean"},
            {[](auto& f) { f.bounds.reach = -1.0f; }, "reach"},
+           {[](auto& f) { f.bounds.reach = 1e20f; }, "reach"},
            {[](auto& f) { f.reserved[2] = 7; }, "reserved"},
            {[](auto& f) { f.units.factor *= 1.5f; }, "unit"},
            {[](auto& f) { f.units.factor = 0x1p-100f; }, "unit"},
+           {[](auto& f) { f.units.factor = 0x1p100f; }, "unit"},
            {[](auto& f) { f.units.sh[2] = 1e30f; }, "harmonics"},
        })
-    EXPECT_THAT(
-        fault(with_page(leaves, [&](TreePage& page) { facts.change(page.facts(slot)); }), leaves),
-        HasSubstr(facts.fault));
+    EXPECT_THAT(fault_with(leaves, [&](TreePage& page) { facts.change(page.facts(slot)); }),
+                HasSubstr(facts.fault));
   struct Record {
     std::size_t offset;
     std::uint16_t bits;
@@ -121,12 +116,66 @@ TEST_F(TreeFileTest, ValuesOfPagesAreCheckedThoughTheirChecksumIsRight) {
            {packed_offset(0, 16, 3) + 2, 0x7fc0, "mean"},  // NaN
            {packed_offset(0, 16, 3) + 14, 0x7c00, "colour"},
            {packed_offset(16, 16, 3) + 14, 0xfc01, "colour"},
+           {packed_offset(16, 16, 3) + 14, 0xe3d1, "colour"},  // under -1000
        }) {
     const auto change = [&](TreePage& page) {
       std::memcpy(&page.block(slot)[record.offset], &record.bits, sizeof record.bits);
     };
-    EXPECT_THAT(fault(with_page(leaves, change), leaves), HasSubstr(record.fault));
+    EXPECT_THAT(fault_with(leaves, change), HasSubstr(record.fault));
   }
+}
+
+TEST_F(TreeFileTest, UnusedBytesOfPagesAreZeros) {
+  const auto facts = [&](std::uint64_t page, std::size_t slot, const auto& change) {
+    return fault_with(page, [&](TreePage& forged) { change(forged.facts(slot)); });
+  };
+  // The root's page has two of its levels, and the last one half of its last row.
+  const std::uint64_t last = shape_.page_of({0, 39});
+  const auto page_and = [](std::uint64_t page, const std::string& what) {
+    return AllOf(HasSubstr("a.tree: page " + std::to_string(page)), HasSubstr(what));
+  };
+  EXPECT_THAT(facts(0, 3, [](auto& f) { f.count = 257; }), page_and(0, "facts of unused slot 3"));
+  EXPECT_THAT(facts(0, 3, [](auto& f) { f.count = 1; }), page_and(0, "facts of unused slot 3"));
+  EXPECT_THAT(facts(0, 30, [](auto& f) { f.error = 1.0f; }),
+              page_and(0, "facts of unused slot 30"));
+  EXPECT_THAT(facts(last, 30, [](auto& f) { f.bounds.centre.x = NAN; }),
+              page_and(last, "facts of unused slot 30"));
+  const auto byte = [&](std::uint64_t page, std::size_t at) {
+    return fault_with(page, [&](TreePage& forged) { forged.bytes()[at] = std::byte{1}; });
+  };
+  EXPECT_THAT(byte(0, shape_.block_offset(3)), page_and(0, "records of unused slot 3"));
+  EXPECT_THAT(byte(0, shape_.block_offset(31) - 1), page_and(0, "records of unused slot 30"));
+  EXPECT_THAT(byte(1, 4), page_and(1, "bytes 4 to 63"));
+  EXPECT_THAT(byte(1, 63), page_and(1, "bytes 4 to 63"));
+  EXPECT_THAT(byte(1, shape_.page_bytes() - 1), page_and(1, "bytes behind the last block"));
+  // The last leaf has 246 records.
+  const std::size_t block = shape_.block_offset(shape_.slot_of({0, 39}));
+  EXPECT_EQ(read(with_page(bytes_, last, [](TreePage&) {})).notes.size(), 0u);
+  EXPECT_THAT(byte(last, block + packed_offset(0, 16, 246)),
+              page_and(last, "unused records of node 0.39"));
+  EXPECT_THAT(byte(last, block + packed_offset(16, 16, 255) + 15),
+              page_and(last, "unused records of node 0.39"));
+}
+
+TEST_F(TreeFileTest, ErrorsAndBoundsGrowTowardsTheRoot) {
+  const std::uint64_t leaves = shape_.page_of({0, 0});
+  const auto error = [&](const std::function<void(NodeFacts & above, NodeFacts & node)>& change) {
+    return fault_with(leaves, [&](TreePage& page) { change(page.facts(1), page.facts(3)); });
+  };
+  EXPECT_THAT(error([](auto& above, auto& node) { node.error = 2.0f * above.error; }),
+              HasSubstr("error of node 2.0 exceeds"));
+  EXPECT_THAT(error([](auto& above, auto& node) { node.bounds.reach = 2.0f * above.bounds.reach; }),
+              HasSubstr("reach of node 2.0 exceeds"));
+  EXPECT_THAT(error([](auto& above, auto& node) {
+                node.bounds.half_extent.y += 2.0f * above.bounds.half_extent.y;
+              }),
+              HasSubstr("box of node 2.0 exceeds"));
+  TreeFile tree(source_of(bytes_));
+  NodeFacts above = tree.page(0)->facts(shape_.slot_of({5, 0}));
+  EXPECT_NE(tree.page(leaves, &above), nullptr);
+  above.error = 0.0f;
+  EXPECT_EQ(tree.page(leaves, &above), nullptr);
+  EXPECT_THAT(tree.damage().first, HasSubstr("error of node 4.0 exceeds"));
 }
 
 TEST_F(TreeFileTest, PagesOfOtherPlacesAreNotTaken) {

@@ -43,6 +43,27 @@ TEST(TreeShape, EveryNodeHasASlotOfItsOwnBesideItsFamily) {
     }
 }
 
+TEST(TreeShape, ThePagesHaveEachNodeOnce) {
+  for (const std::uint64_t leaves : {1, 2, 3, 9, 17, 129, 1000})
+    for (const int degree : {0, 3}) {
+      SCOPED_TRACE(testing::Message() << leaves << " leaves, degree " << degree);
+      const TreeShape shape(leaves * cluster_size - 7, degree);
+      std::set<std::pair<int, std::uint32_t>> nodes;
+      for (std::uint64_t page = 0; page < shape.pages(); ++page)
+        for_each_node_in(shape, page, [&](NodeId node) {
+          ASSERT_EQ(shape.page_of(node), page);
+          ASSERT_EQ(shape.slot_of(node) == 0, node == shape.root_of(page));
+          ASSERT_LT(node.index, shape.nodes_on(node.level));
+          ASSERT_TRUE(nodes.emplace(node.level, node.index).second);
+        });
+      std::size_t count = 0;
+      for (int level = 0; level < shape.levels(); ++level) count += shape.nodes_on(level);
+      EXPECT_EQ(nodes.size(), count);
+      for (std::uint64_t page = 1; page < shape.pages(); ++page)
+        EXPECT_LT(shape.page_of(refined_by(shape, page)), page);
+    }
+}
+
 TEST(TreeShape, PagesAreAboutAQuarterOfAMegabyte) {
   for (int degree = 0; degree <= max_sh_degree; ++degree) {
     const TreeShape shape(1'000'000, degree);

@@ -1,13 +1,18 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "render_core/scene/tree/build_tree.h"
+#include "render_core/scene/tree/tree_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -48,6 +53,20 @@ class OwnedSource final : public ByteSource {
   }
   std::string bytes_;
 };
+
+/// The tree with another page, whose checksum is right.
+inline std::string with_page(std::string tree, std::uint64_t number,
+                             const std::function<void(TreePage&)>& change) {
+  const auto header = load_as<TreeHeader>(std::as_bytes(std::span(tree)).data());
+  const TreeShape shape(header.gaussians, static_cast<int>(header.sh_degree));
+  TreePage page(shape);
+  char* at = tree.data() + shape.page_offset(number);
+  std::memcpy(page.bytes().data(), at, page.bytes().size());
+  change(page);
+  page.seal(number);
+  std::memcpy(at, page.bytes().data(), page.bytes().size());
+  return tree;
+}
 
 inline std::unique_ptr<const ByteSource> source_of(std::string bytes) {
   return std::make_unique<OwnedSource>(std::move(bytes));

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include "render_core/base/host_device.h"
@@ -48,14 +50,19 @@ struct TreeCut {
   double now_s;
   float* share;  // [cluster], the part of each node that is drawn
 
-  __device__ std::uint32_t level_of(std::uint32_t n) const {
-    const int depth = 31 - __clz(static_cast<int>(n % clusters_per_slot + 1));
+  [[nodiscard]] CATGS_HD std::uint32_t level_of(std::uint32_t n) const {
+    const std::uint32_t rank = n % clusters_per_slot + 1;
+#if defined(__CUDA_ARCH__)
+    const int depth = 31 - __clz(static_cast<int>(rank));
+#else
+    const int depth = static_cast<int>(std::bit_width(rank)) - 1;
+#endif
     return tree.pages[n / clusters_per_slot].top_level - static_cast<std::uint32_t>(depth);
   }
 
   /// The part of the node of cluster `c` that its descendants have taken over where they are all
   /// shown.
-  __device__ float split(const Cluster* clusters, std::uint32_t c) const {
+  [[nodiscard]] CATGS_HD float split(const Cluster* clusters, std::uint32_t c) const {
     const float error = tree.errors[c];
     return split_share(fmaxf(now.error_px(error, clusters[c]), end.error_px(error, clusters[c])),
                        detail_px);
@@ -64,7 +71,7 @@ struct TreeCut {
   /// The part of node `n` that is drawn. Both cuts of a node and of its children follow from errors
   /// that grow towards the root, and from pages that come no earlier than the page above. So no
   /// other node needs to be asked.
-  __device__ float share_of(const Cluster* clusters, std::uint32_t n) const {
+  [[nodiscard]] CATGS_HD float share_of(const Cluster* clusters, std::uint32_t n) const {
     const std::uint32_t in_page = n % clusters_per_slot;
     const PageEntry& page = tree.pages[n / clusters_per_slot];
     const std::uint32_t c = tree.cluster_of(n);
