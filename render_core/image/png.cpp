@@ -10,6 +10,7 @@
 #include <cstring>
 #include <memory>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <png.h>
@@ -46,7 +47,8 @@ class PngFile {
     png_destroy_write_struct(&png_, &info_);
     if (!file_) return;
     file_.reset();
-    std::remove(path_.c_str());
+    std::error_code error;
+    if (std::filesystem::is_regular_file(path_, error)) std::filesystem::remove(path_, error);
   }
   PngFile(const PngFile&) = delete;
   PngFile& operator=(const PngFile&) = delete;
@@ -86,7 +88,7 @@ class PngFile {
   }
   [[noreturn]] static void on_error(png_structp png, png_const_charp why) {
     auto& error = static_cast<PngFile*>(png_get_error_ptr(png))->error_;
-    std::strncpy(error.data(), why, error.size() - 1);
+    fmt::format_to_n(error.data(), error.size() - 1, "{}", why);
     png_longjmp(png, 1);
   }
   static void on_warning(png_structp, png_const_charp) {}

@@ -51,8 +51,8 @@ std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_i
   if (std::ranges::count(jobs_, FilmState::waiting, &FilmJob::state) >=
       static_cast<std::ptrdiff_t>(most_waiting))
     return Refused{false};
-  const FilmReport report{.kind = wish.kind, .changed = clock_()};
-  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(owner), std::move(wish)});
+  const FilmReport report{.kind = wish.kind, .owner = std::move(owner), .changed = clock_()};
+  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(wish)});
   return jobs_.back().id;
 }
 

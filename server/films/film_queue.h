@@ -22,6 +22,7 @@ enum class FilmState { waiting, drawing, done, failed, cancelled };
 /// The facts of a job that its author is told.
 struct FilmReport {
   FilmKind kind = FilmKind::picture;
+  std::string owner{};  // id of the token that ordered it: one job at a time for each
   FilmState state = FilmState::waiting;
   double share = 0.0;  // drawn
   std::string error{};
@@ -35,7 +36,6 @@ bool has_ended(const FilmReport& job);
 struct FilmJob : FilmReport {
   std::string id;  // whoever knows it may ask for the result
   std::string scene_id;
-  std::string owner;  // who ordered it: one job at a time for each
   FilmWish wish;
 };
 

@@ -96,6 +96,8 @@ class SceneResidency {
   }
   /// True while a scene is being loaded or waits for it.
   [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
+  /// True while a scene is being loaded that no visitor waits for.
+  [[nodiscard]] bool loads_in_background() const { return in_background_; }
   /// True while a visitor waits for a scene that is not being loaded yet.
   [[nodiscard]] bool visitor_waits() const { return waiting_.has_value(); }
   /// True if it fits without releasing a scene.

@@ -88,6 +88,14 @@ std::string SceneShelf::resolve(std::string_view wish) const {
   return std::string(wish);
 }
 
+std::vector<ScenePages> SceneShelf::pages() const {
+  std::vector<ScenePages> all;
+  for (const auto& [id, book] : books_)
+    if (book.entry)
+      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
+  return all;
+}
+
 void SceneShelf::publish(const std::function<std::string(const FoundScene&)>& state_of) {
   auto listing = std::make_shared<std::vector<SceneListing>>();
   for (const std::string& id : scene_ids()) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/base/clock.h"
+#include "server/base/page_metrics.h"
 #include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_grounds.h"
@@ -96,6 +97,8 @@ class SceneShelf {
   /// not tell them apart.
   [[nodiscard]] std::string resolve(std::string_view wish) const;
 
+  /// The pages of trees that are in memory.
+  [[nodiscard]] std::vector<ScenePages> pages() const;
   /// Updates listing(). `state_of`: what is done for a scene at the moment, for people.
   void publish(const std::function<std::string(const FoundScene&)>& state_of);
   /// Any thread.
