@@ -289,11 +289,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
                    SessionTokens(s.access.own_key()), s.metrics, s.counts ? &*s.counts : nullptr,
                    [&s] { return s.access.revoked_links(); }});
-  s.authors.films = std::make_unique<FilmStudio>(
-      FilmStudio::Surroundings{s.io, [&s](const auto& id, bool again) {
-                                 return s.scenes->lease(id, again);
-                               },
-                               [&s] { return s.places->anybody_looks(); }, ended});
+  s.authors.films = std::make_unique<FilmStudio>(FilmStudio::Surroundings{
+      s.io, [&s](const auto& id, bool again) { return s.scenes->lease(id, again); },
+      [&s] { return s.places->anybody_looks(); }, ended});
 }
 
 Server::~Server() {

@@ -21,8 +21,9 @@ Pose levelled(const Pose& pose, const glm::vec3& up);
 /// (EWA), so pictures side by side would show seams.
 /// `after_row` is called seven times for each row of the picture, by threads of the pool, and may
 /// throw to cancel.
-Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
-                    const std::function<Image(const FrameRequest&)>& draw,
-                    const std::function<void()>& after_row = [] {});
+Image draw_panorama(
+    const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
+    const std::function<Image(const FrameRequest&)>& draw,
+    const std::function<void()>& after_row = [] {});
 
 }  // namespace catgs

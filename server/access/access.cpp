@@ -165,8 +165,7 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
 }
 
 std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
-                                                         std::int64_t now_unix_s,
-                                                         Permit& permit) {
+                                                         std::int64_t now_unix_s, Permit& permit) {
   const LinkGrant everything;  // the default grant: all that viewers may do
   if (!token_file_.given() && key_.empty()) return everything;
   if (token.empty() && open_) return everything;

@@ -36,8 +36,9 @@ struct Permit {
   }
 
   Check check;
-  std::string link_id{};   // of a genuine link, even if it is refused; empty: the token is no link
-  std::string token_id{};  // of a link or a static token, see Ended; empty: it has no right by itself
+  std::string link_id{};  // of a genuine link, even if it is refused; empty: the token is no link
+  std::string
+      token_id{};  // of a link or a static token, see Ended; empty: it has no right by itself
   std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();  // of a link
 };
 using Authorize = std::function<Permit(const std::string& token)>;

@@ -150,8 +150,8 @@ bool same(const FilmView& a, const FilmView& b) {
 }
 
 void draw_frames(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
-  const auto video = make_mp4_file(
-      {file.path(), wish.size_px, film_fps, 1, [&] { progress.look(); }});
+  const auto video =
+      make_mp4_file({file.path(), wish.size_px, film_fps, 1, [&] { progress.look(); }});
   FrameView frame;
   const std::size_t count = wish.views.size();
   progress.begin(1.0, count);

@@ -28,9 +28,9 @@ namespace catgs {
 ///   GET /api/films/JOB           {"state", "share", "seconds_left", "bytes", "error"}
 ///   GET /api/films/JOB/file      the result
 ///   PUT /api/films/JOB/cancel
-/// A JOB is 128 random bits: whoever knows it may ask for it, until its order's link is revoked. While visitors look at scenes, at
-/// most half of the time is spent on drawing. A scene whose memory visitors need is let go between
-/// two pictures.
+/// A JOB is 128 random bits: whoever knows it may ask for it, until its order's link is revoked.
+/// While visitors look at scenes, at most half of the time is spent on drawing. A scene whose
+/// memory visitors need is let go between two pictures.
 class FilmStudio {
  public:
   struct Surroundings {
@@ -55,8 +55,8 @@ class FilmStudio {
   /// Refuses such a PUT unless its job waits or is being drawn.
   std::optional<HttpResponse> refuse_cancel(const HttpRequest& request);
   std::future<HttpResponse> cancel(const HttpRequest& request);
-  /// The caller has checked that the sender may save the scene. `owner`: id of its token. One whose place is abandoned
-  /// meanwhile orders nothing.
+  /// The caller has checked that the sender may save the scene. `owner`: id of its token. One whose
+  /// place is abandoned meanwhile orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
                                   std::shared_ptr<const UploadPlace> place);
 

@@ -75,8 +75,9 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
         const SceneBook* const book = shelf_.find(id);
         return book ? book->use() : SceneUse::none;
       }),
-      redrawing_(shelf_, trees_, residency_, io, loader_,
-                 [this](const auto& found, const auto& form) { return loads_.load(found, form, false); }),
+      redrawing_(
+          shelf_, trees_, residency_, io, loader_,
+          [this](const auto& found, const auto& form) { return loads_.load(found, form, false); }),
       posters_(
           shelf_, trees_, residency_, io, loader_,
           [this](const auto& found, const auto& form) { return loads_.load(found, form, true); },
@@ -201,7 +202,9 @@ void SceneLibrary::prepare(const std::string& id, TimePoint now) {
   std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
   if (prepared_.size() >= most_prepared) {
     const auto [oldest, since] = prepared_.front();
-    if (use_of_(oldest) != SceneUse::none || now - since < std::chrono::seconds(config_.scene_residency_s)) return;
+    if (use_of_(oldest) != SceneUse::none ||
+        now - since < std::chrono::seconds(config_.scene_residency_s))
+      return;
     release(oldest);
     prepared_.erase(prepared_.begin());
   }

@@ -103,7 +103,7 @@ class SceneLibrary final : public SceneSource {
   SceneShelf shelf_;
   SceneResidency residency_;
   const SceneResidency::UseOf use_of_;
-  double bytes_per_second_ = 100e6;  // of the last load
+  double bytes_per_second_ = 100e6;     // of the last load
   std::optional<TimePoint> next_scan_;  // nothing without folders, and while a scan runs
   struct Prepared {
     std::string id;

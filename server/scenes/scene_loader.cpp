@@ -36,8 +36,8 @@ std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found)
   const std::string spec = found.path.string();
   const auto load_as = [&](const SceneForm& form) {
     return load_scene(
-        spec, form, [&](const std::string& name) { return ids_.id_of(spec, name); }, config_,
-        core_, core_.pool->threads());
+        spec, form, [&](const std::string& name) { return ids_.id_of(spec, name); }, config_, core_,
+        core_.pool->threads());
   };
   try {
     if (trees_.ready(found)) return load_as(*trees_.form_of(found));
@@ -54,7 +54,7 @@ std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found)
 }
 
 LoadedScene SceneLoader::load(const FoundScene& found, const SceneForm& form,
-                               bool gives_way) const {
+                              bool gives_way) const {
   try {
     // Half of the processors stay free for the visitors' frames.
     const int threads = std::max(1, core_.pool->threads() / 2);

@@ -23,15 +23,15 @@ void ScenePosters::start(SceneBook& book, const SceneForm& form) {
     std::shared_ptr<const std::string> poster;
     const LoadedScene loaded = load_(found, form);
     if (loaded.entry) poster = loaded.entry->poster;
-    boost::asio::post(io_, [this, id = found.id, changed = found.changed, poster,
-                            gave_way = loaded.gave_way] {
-      busy_ = false;
-      SceneBook* const made_for = shelf_.find(id);
-      if (!made_for || made_for->found.changed != changed) return;
-      if (gave_way) made_for->poster_tried = false;
-      if (!made_for->poster) made_for->poster = poster;
-      changed_();
-    });
+    boost::asio::post(
+        io_, [this, id = found.id, changed = found.changed, poster, gave_way = loaded.gave_way] {
+          busy_ = false;
+          SceneBook* const made_for = shelf_.find(id);
+          if (!made_for || made_for->found.changed != changed) return;
+          if (gave_way) made_for->poster_tried = false;
+          if (!made_for->poster) made_for->poster = poster;
+          changed_();
+        });
   });
 }
 

@@ -27,9 +27,8 @@ std::shared_ptr<const SceneEntry> SceneRedrawing::newer_form(const SceneEntry& s
 }
 
 bool SceneRedrawing::holds_two_forms() const {
-  return busy_ || std::ranges::any_of(shelf_.books(), [](const auto& of) {
-           return of.second.former != nullptr;
-         });
+  return busy_ || std::ranges::any_of(shelf_.books(),
+                                      [](const auto& of) { return of.second.former != nullptr; });
 }
 
 SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {

@@ -44,9 +44,8 @@ std::optional<SceneResidency::Step> SceneResidency::next(TimePoint now, const Us
   });
   if (!release) return std::nullopt;
   Step recalls;
-  std::ranges::copy_if(*release, std::back_inserter(recalls.recall), [&](const std::string& id) {
-    return use_of(id) == SceneUse::background;
-  });
+  std::ranges::copy_if(*release, std::back_inserter(recalls.recall),
+                       [&](const std::string& id) { return use_of(id) == SceneUse::background; });
   if (!recalls.recall.empty()) return recalls;
   return begin(std::exchange(waiting_, std::nullopt)->id, *std::move(release), false);
 }

@@ -48,7 +48,8 @@ class SceneTrees {
   [[nodiscard]] SceneNeed need_of(const FoundScene& scene) const;
 
   /// Orders a scene's tree, unless it is ordered already, or could not be built or used of late.
-  /// `urgent`: visitors wait for it. Then a build that nobody waits for is cancelled and made later.
+  /// `urgent`: visitors wait for it. Then a build that nobody waits for is cancelled and made
+  /// later.
   void order(const FoundScene& scene, bool urgent);
   /// Builds a scene's tree on this thread, before the server runs. Throws InputError.
   void build_now(const FoundScene& scene);

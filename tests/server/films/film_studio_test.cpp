@@ -34,10 +34,10 @@ std::string film_of(int frames) {
 class FilmStudioTest : public testing::Test {
  protected:
   FilmStudioTest() {
-    scene.renderer = make_renderer(std::make_shared<GaussianCloud>(random_cloud(300, 0)),
-                                   {.kind = RendererKind::cpu,
-                                    .pool = std::make_shared<ThreadPool>(1)})
-                         .renderer;
+    scene.renderer =
+        make_renderer(std::make_shared<GaussianCloud>(random_cloud(300, 0)),
+                      {.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(1)})
+            .renderer;
     scene.facts.near_z = 0.2f;
   }
   void start(std::chrono::milliseconds longest_wait = 10min) {
@@ -55,9 +55,7 @@ class FilmStudioTest : public testing::Test {
     return nlohmann::json::parse(*answer.get().body).at("id");
   }
   HttpResponse get(const std::string& path) { return *studio->respond({"/api/films/" + path, {}}); }
-  nlohmann::json report(const std::string& job) {
-    return nlohmann::json::parse(*get(job).body);
-  }
+  nlohmann::json report(const std::string& job) { return nlohmann::json::parse(*get(job).body); }
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 20'000 && !holds(); ++i) {
       io.restart();
