@@ -101,7 +101,8 @@ struct Server::State {
   State(const ServerConfig& configuration, const ServerParts& parts)
       : config(configuration),
         liveness(parts.liveness_clock),
-        access(config.token_file, config.token_key_file, config.open, config.revoked_links),
+        access(config.token_file, config.token_key_file, config.open, config.revoked_links,
+               own_key(config)),
         client(find_client(config.client_dir)),
         net(net_options()),
         pool(std::make_shared<ThreadPool>(config.threads)),
@@ -180,9 +181,8 @@ NetOptions Server::State::net_options() {
     if (MediaApi::is_file(request.path))
       return api.media->save(request, std::move(body), std::move(place));
     if (SceneApi::orders_film(request))
-      return authors.films->order(api.scenes->saved_scene(request),
-                                  std::string(request.authorization), std::move(body),
-                                  std::move(place));
+      return authors.films->order(api.scenes->saved_scene(request), api.scenes->author_of(request),
+                                  std::move(body), std::move(place));
     return authors.saver->save(api.scenes->saved_scene(request), std::move(body),
                                {std::string(request.if_match), std::string(request.if_none_match)},
                                std::move(place));
@@ -280,9 +280,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
     return s.access.permit(token, unix_now_s(), resolve);
   };
   s.api.scenes = std::make_unique<SceneApi>(*s.scenes, authorize);
-  const std::string key = own_key(s.config);
-  s.api.media = std::make_unique<MediaApi>(MediaApi::Parts{
-      *s.scenes, authorize, [&s] { return s.access.revoked_links(); }, key, unix_now_s});
+  const auto ended = [&s](std::string_view token_id) { return s.access.ended(token_id); };
+  s.api.media = std::make_unique<MediaApi>(
+      MediaApi::Parts{*s.scenes, authorize, ended, s.access.own_key(), unix_now_s});
   VisitOptions options = visit_options(s.config);
   PoolExecutor::Pools pools{s.pool};
   for (const auto& [device, views] : s.devices->views())
@@ -297,11 +297,11 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       [&s](const auto& why) { s.give_up("no device renders any more: " + why); }, s.metrics);
   s.places = std::make_unique<Places>(
       VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
-                   SessionTokens(key), s.metrics, s.counts ? &*s.counts : nullptr,
+                   SessionTokens(s.access.own_key()), s.metrics, s.counts ? &*s.counts : nullptr,
                    [&s] { return s.access.revoked_links(); }});
-  s.authors.films = std::make_unique<FilmStudio>(
-      FilmStudio::Surroundings{s.io, [&s](const auto& id) { return s.scenes->in_memory(id); },
-                               [&s] { return s.places->anybody_looks(); }});
+  s.authors.films = std::make_unique<FilmStudio>(FilmStudio::Surroundings{
+      s.io, [&s](const auto& id, bool again) { return s.scenes->lease(id, again); },
+      [&s] { return s.places->anybody_looks(); }, ended});
 }
 
 Server::~Server() {

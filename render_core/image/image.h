@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -17,5 +20,10 @@ struct Image {
     return rgb.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(size_px.x) * 3;
   }
 };
+
+/// A channel's value in [0, 1] as one of 8 bits, rounded to nearest.
+inline std::uint8_t byte_of(float value) {
+  return static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f)));
+}
 
 }  // namespace catgs

@@ -96,7 +96,8 @@ Pose levelled(const Pose& pose, const glm::vec3& up) {
 }
 
 Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
-                    const std::function<Image(const FrameRequest&)>& draw) {
+                    const std::function<Image(const FrameRequest&)>& draw,
+                    const std::function<void()>& after_row) {
   assert(size_px.x == 2 * size_px.y);
   // As many pixels a radian in the middle of a side as at the equator.
   const float focal_px = static_cast<float>(size_px.x) / (2.0f * std::numbers::pi_v<float>);
@@ -105,6 +106,7 @@ Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool&
       static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y);
   Image out{size_px, std::vector<float>(3 * pixels)};
   std::vector<float> weights(pixels);
+  const auto rows = static_cast<std::size_t>(size_px.y);
   const Pose& pose = request.camera.world_from_camera;
   for (const Side& side : sides) {
     FrameRequest of_side = request;
@@ -114,12 +116,17 @@ Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool&
                     glm::ivec2(side_px), focal_px, request.camera.near_z);
     of_side.camera.clip = request.camera.clip;
     const Image picture = draw(of_side);
-    pool.parallel_for(static_cast<std::size_t>(size_px.y), [&](std::size_t y) {
+    pool.parallel_for(rows, [&](std::size_t y) {
       add_row(picture, side, focal_px, static_cast<int>(y), out, weights);
+      after_row();
     });
   }
-  for (std::size_t i = 0; i < pixels; ++i)
-    for (std::size_t channel = 0; channel < 3; ++channel) out.rgb[3 * i + channel] /= weights[i];
+  pool.parallel_for(rows, [&](std::size_t y) {
+    const auto width = static_cast<std::size_t>(size_px.x);
+    for (std::size_t i = y * width; i < (y + 1) * width; ++i)
+      for (std::size_t channel = 0; channel < 3; ++channel) out.rgb[3 * i + channel] /= weights[i];
+    after_row();
+  });
   return out;
 }
 

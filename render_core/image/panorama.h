@@ -19,7 +19,11 @@ Pose levelled(const Pose& pose, const glm::vec3& up);
 /// Six pictures are drawn, one along each axis of the camera. They are wider than a right angle and
 /// fade into each other where they overlap. A splat is a projection that holds near its centre only
 /// (EWA), so pictures side by side would show seams.
-Image draw_panorama(const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
-                    const std::function<Image(const FrameRequest&)>& draw);
+/// `after_row` is called seven times for each row of the picture, by threads of the pool, and may
+/// throw to cancel.
+Image draw_panorama(
+    const FrameRequest& request, glm::ivec2 size_px, ThreadPool& pool,
+    const std::function<Image(const FrameRequest&)>& draw,
+    const std::function<void()>& after_row = [] {});
 
 }  // namespace catgs

@@ -1,11 +1,16 @@
 #include "render_core/image/png.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
-#include <cmath>
+#include <cerrno>
+#include <csetjmp>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <memory>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <png.h>
@@ -23,15 +28,89 @@ struct PngImage : png_image {
   PngImage& operator=(const PngImage&) = delete;
 };
 
-void write_bytes(const std::filesystem::path& path, glm::ivec2 size_px, png_uint_32 format,
-                 const std::uint8_t* bytes) {
-  PngImage png;
-  png.width = static_cast<png_uint_32>(size_px.x);
-  png.height = static_cast<png_uint_32>(size_px.y);
-  png.format = format;
-  if (png_image_write_to_file(&png, path.c_str(), 0, bytes, 0, nullptr) == 0) {
-    throw InputError(path.string(), "", png.message, "does the folder exist, is there room?");
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+
+/// A PNG of 8 bits per channel that is written row by row. libpng reports errors by a jump, so each
+/// call of it is made where no destructor would be jumped over.
+class PngFile {
+ public:
+  explicit PngFile(const std::filesystem::path& path)
+      : path_(path), file_(std::fopen(path.c_str(), "wb")) {
+    if (!file_) fail(std::strerror(errno));
+    png_ = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, on_error, on_warning);
+    if (png_) info_ = png_create_info_struct(png_);
+    if (!info_) fail("out of memory");
   }
+  ~PngFile() {
+    png_destroy_write_struct(&png_, &info_);
+    if (!file_) return;
+    file_.reset();
+    std::error_code error;
+    if (std::filesystem::is_regular_file(path_, error)) std::filesystem::remove(path_, error);
+  }
+  PngFile(const PngFile&) = delete;
+  PngFile& operator=(const PngFile&) = delete;
+
+  void begin(glm::ivec2 size_px, int colour_type) {
+    attempt([&] {
+      png_init_io(png_, file_.get());
+      png_set_IHDR(png_, info_, static_cast<png_uint_32>(size_px.x),
+                   static_cast<png_uint_32>(size_px.y), 8, colour_type, PNG_INTERLACE_NONE,
+                   PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+      png_set_sRGB(png_, info_, PNG_sRGB_INTENT_PERCEPTUAL);
+      png_write_info(png_, info_);
+    });
+  }
+  void write_row(const std::uint8_t* row) {
+    attempt([&] { png_write_row(png_, row); });
+  }
+  void finish() {
+    attempt([&] { png_write_end(png_, nullptr); });
+    if (std::fflush(file_.get()) != 0) fail(std::strerror(errno));
+    file_.reset();
+  }
+
+ private:
+  template <typename Call>
+  void attempt(const Call& call) {
+    if (!returns(png_, call)) fail(error_.data());
+  }
+  template <typename Call>
+  static bool returns(png_structp png, const Call& call) {
+    if (setjmp(png_jmpbuf(png)) != 0) return false;
+    call();
+    return true;
+  }
+  [[noreturn]] void fail(const char* why) const {
+    throw InputError(path_.string(), "", why, "does the folder exist, is there room?");
+  }
+  [[noreturn]] static void on_error(png_structp png, png_const_charp why) {
+    auto& error = static_cast<PngFile*>(png_get_error_ptr(png))->error_;
+    fmt::format_to_n(error.data(), error.size() - 1, "{}", why);
+    png_longjmp(png, 1);
+  }
+  static void on_warning(png_structp, png_const_charp) {}
+
+  const std::filesystem::path path_;
+  std::unique_ptr<std::FILE, CloseFile> file_;  // null: the file is complete
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+  std::array<char, 128> error_{};  // of libpng
+};
+
+/// `row_of(y)` is read before the next call.
+template <typename RowOf>
+void write_rows(const std::filesystem::path& path, glm::ivec2 size_px, int colour_type,
+                const RowOf& row_of, const AfterRow& after_row) {
+  PngFile file(path);
+  file.begin(size_px, colour_type);
+  for (int y = 0; y < size_px.y; ++y) {
+    file.write_row(row_of(y));
+    if (after_row) after_row();
+  }
+  file.finish();
 }
 
 }  // namespace
@@ -60,28 +139,33 @@ Image read_png(const std::filesystem::path& path) {
   return image;
 }
 
-void write_png(const std::filesystem::path& path, const Image& image,
-               std::span<const float> alpha) {
+void write_png(const std::filesystem::path& path, const Image& image, std::span<const float> alpha,
+               const AfterRow& after_row) {
   assert(alpha.empty() || alpha.size() == image.pixels());
-  const auto byte = [](float value) {
-    return static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f)));
-  };
+  const auto width = static_cast<std::size_t>(image.size_px.x);
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(image.pixels() * (alpha.empty() ? 3 : 4));
-  for (std::size_t i = 0; i < image.pixels(); ++i) {
-    // A PNG's colour is what an opaque pixel would have.
-    const float share = alpha.empty() || alpha[i] <= 0.0f ? 1.0f : alpha[i];
-    for (std::size_t c = 0; c < 3; ++c) bytes.push_back(byte(image.rgb[3 * i + c] / share));
-    if (!alpha.empty()) bytes.push_back(byte(alpha[i]));
-  }
-  write_bytes(path, image.size_px, alpha.empty() ? PNG_FORMAT_RGB : PNG_FORMAT_RGBA, bytes.data());
+  const auto row_of = [&](int y) {
+    bytes.clear();
+    const std::size_t first = width * static_cast<std::size_t>(y);
+    for (std::size_t i = first; i < first + width; ++i) {
+      // A PNG's colour is what an opaque pixel would have.
+      const float share = alpha.empty() || alpha[i] <= 0.0f ? 1.0f : alpha[i];
+      for (std::size_t c = 0; c < 3; ++c) bytes.push_back(byte_of(image.rgb[3 * i + c] / share));
+      if (!alpha.empty()) bytes.push_back(byte_of(alpha[i]));
+    }
+    return bytes.data();
+  };
+  write_rows(path, image.size_px, alpha.empty() ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA,
+             row_of, after_row);
 }
 
 void write_png(const std::filesystem::path& path, glm::ivec2 size_px,
-               std::span<const std::uint8_t> rgb) {
-  assert(rgb.size() ==
-         3 * static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y));
-  write_bytes(path, size_px, PNG_FORMAT_RGB, rgb.data());
+               std::span<const std::uint8_t> rgb, const AfterRow& after_row) {
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(size_px.x);
+  assert(rgb.size() == row_bytes * static_cast<std::size_t>(size_px.y));
+  write_rows(
+      path, size_px, PNG_COLOR_TYPE_RGB,
+      [&](int y) { return rgb.data() + row_bytes * static_cast<std::size_t>(y); }, after_row);
 }
 
 Image copy_image(const FrameView& frame) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 
 #include "render_core/frame/renderer.h"
@@ -13,15 +14,18 @@ namespace catgs {
 /// Throws InputError.
 Image read_png(const std::filesystem::path& path);
 
+/// Called after each row of a picture. May throw, to cancel.
+using AfterRow = std::function<void()>;
+
 /// Writes 8 bits per channel, rounded to nearest. `alpha` has one value per pixel of a picture that
 /// was drawn over black; without it the file has no alpha. Throws InputError when the file cannot
-/// be written.
+/// be written. No file is left then, nor after `after_row` has thrown.
 void write_png(const std::filesystem::path& path, const Image& image,
-               std::span<const float> alpha = {});
+               std::span<const float> alpha = {}, const AfterRow& after_row = {});
 
 /// Writes bytes as they are: three a pixel, row by row from the top.
 void write_png(const std::filesystem::path& path, glm::ivec2 size_px,
-               std::span<const std::uint8_t> rgb);
+               std::span<const std::uint8_t> rgb, const AfterRow& after_row = {});
 
 /// Copies a finished rgb_f32 frame out of its View.
 Image copy_image(const FrameView& frame);

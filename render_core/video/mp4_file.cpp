@@ -1,4 +1,5 @@
 #include <cerrno>
+#include <exception>
 #include <memory>
 
 #include <fmt/format.h>
@@ -37,17 +38,24 @@ using Output = std::unique_ptr<AVFormatContext, CloseOutput>;
 class Mp4File final : public VideoFile {
  public:
   explicit Mp4File(const VideoSettings& settings)
-      : path_(settings.path), frame_(av_frame_alloc()), packet_(av_packet_alloc()) {
+      : path_(settings.path),
+        progress_(settings.progress),
+        frame_(av_frame_alloc()),
+        packet_(av_packet_alloc()) {
     AVFormatContext* output = nullptr;
     check(avformat_alloc_output_context2(&output, nullptr, "mp4", path_.c_str()), "open");
     output_.reset(output);
+    output->interrupt_callback = {[](void* file) { return static_cast<Mp4File*>(file)->ends(); },
+                                  this};
     open_encoder(settings);
     stream_ = avformat_new_stream(output, nullptr);
     if (stream_ == nullptr) check(AVERROR(ENOMEM), "open");
     stream_->time_base = encoder_->time_base;
     stream_->avg_frame_rate = encoder_->framerate;
     check(avcodec_parameters_from_context(stream_->codecpar, encoder_.get()), "open");
-    check(avio_open(&output->pb, path_.c_str(), AVIO_FLAG_WRITE), "open");
+    check(avio_open2(&output->pb, path_.c_str(), AVIO_FLAG_WRITE, &output->interrupt_callback,
+                     nullptr),
+          "open");
     AVDictionary* options = nullptr;
     av_dict_set(&options, "movflags", "+faststart", 0);
     const int result = avformat_write_header(output, &options);
@@ -108,10 +116,22 @@ class Mp4File final : public VideoFile {
       packet_->stream_index = stream_->index;
       av_packet_rescale_ts(packet_.get(), encoder_->time_base, stream_->time_base);
       check(av_interleaved_write_frame(output_.get(), packet_.get()), "write");
+      progress_();
     }
   }
 
+  /// libavformat asks whether to give up. Exceptions must not pass through it: check() throws them.
+  int ends() noexcept {
+    try {
+      if (!interruption_) progress_();
+    } catch (...) {
+      interruption_ = std::current_exception();
+    }
+    return interruption_ ? 1 : 0;
+  }
+
   void check(int result, std::string_view action) const {
+    if (interruption_) std::rethrow_exception(interruption_);
     if (result >= 0) return;
     char text[AV_ERROR_MAX_STRING_SIZE] = {};
     av_strerror(result, text, sizeof text);
@@ -119,7 +139,9 @@ class Mp4File final : public VideoFile {
   }
 
   std::string path_;
-  Output output_;
+  const std::function<void()> progress_;
+  std::exception_ptr interruption_;  // thrown by progress_
+  Output output_;                    // asks ends() until it is closed
   CodecContext encoder_;
   Frame frame_;
   Packet packet_;

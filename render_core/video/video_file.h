@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -29,6 +30,9 @@ struct VideoSettings {
   glm::ivec2 size_px{0};  // even sides
   double fps = 30.0;
   int threads = 0;  // of the encoder; 0: as many as it likes
+  /// Called between frames of the encoder, and often while bytes are written. What it throws, the
+  /// function of the VideoFile throws: the file is then unusable.
+  std::function<void()> progress = [] {};
 };
 
 /// H.264 in MP4 through libavformat and libx264, BT.709 limited range 4:2:0. Players can begin

@@ -19,7 +19,8 @@
 namespace catgs {
 namespace {
 
-constexpr std::string_view link_purpose = "catgs-link-v1";
+constexpr std::string_view link_purpose = "catgs-link-v1", name_purpose = "catgs-token-name-v1";
+constexpr std::string_view static_prefix = "token-";  // of ids, which no link's id has
 constexpr std::size_t min_key_bytes = 16;
 constexpr std::size_t min_token_bytes = 8;
 constexpr std::size_t max_token_bytes = 512;
@@ -130,8 +131,9 @@ std::chrono::seconds parse_duration(std::string_view text) {
 
 AccessControl::AccessControl(std::filesystem::path token_file,
                              const std::filesystem::path& key_file, bool open,
-                             std::filesystem::path revoked_links)
+                             std::filesystem::path revoked_links, std::string own_key)
     : open_(open),
+      own_key_(std::move(own_key)),
       token_file_("--token-file", std::move(token_file)),
       revoked_file_("--revoked-links", std::move(revoked_links)) {
   if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
@@ -141,15 +143,14 @@ AccessControl::AccessControl(std::filesystem::path token_file,
 
 Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
                              const ResolveScene& resolve) {
-  std::string link_id;
-  auto granted = read(token, now_unix_s, link_id);
-  std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();
+  Permit permit;
+  auto granted = read(token, now_unix_s, permit);
   if (auto* grant = std::get_if<LinkGrant>(&granted)) {
     if (!grant->scene_id.empty()) grant->scene_id = resolve(grant->scene_id);
-    if (!link_id.empty()) expires_unix_s = grant->expires_unix_s;
+    if (!permit.link_id.empty()) permit.expires_unix_s = grant->expires_unix_s;
   }
-  auto check = [granted = std::move(granted), has_authors = !key_.empty(),
-                has_link = !token.empty()](std::string_view scene_id, Use use) -> Refusal {
+  permit.check = [granted = std::move(granted), has_authors = !key_.empty(),
+                  has_link = !token.empty()](std::string_view scene_id, Use use) -> Refusal {
     if (use == Use::save && !has_authors)
       return "nobody can save on this server: it was started without --token-key-file, which "
              "links of role author are made with";
@@ -160,35 +161,46 @@ Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,
     if (!grant.scene_id.empty() && grant.scene_id != scene_id) return other_scene(grant, scene_id);
     return forbidden(grant.role, use);
   };
-  return {
-      .check = std::move(check), .link_id = std::move(link_id), .expires_unix_s = expires_unix_s};
+  return permit;
 }
 
 std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
-                                                         std::int64_t now_unix_s,
-                                                         std::string& link_id) {
+                                                         std::int64_t now_unix_s, Permit& permit) {
   const LinkGrant everything;  // the default grant: all that viewers may do
   if (!token_file_.given() && key_.empty()) return everything;
   if (token.empty() && open_) return everything;
   if (token.empty()) return "this server needs an access token: open the link you were given";
-  if (is_static_token(token)) return everything;
+  permit.token_id = id_of_static(token);
+  if (!permit.token_id.empty()) return everything;
   if (const auto grant = key_.empty() ? std::nullopt : read_link_token(token, key_)) {
-    link_id = grant->id;
-    if (revoked_links()->contains(link_id)) return std::string(link_revoked);
+    permit.link_id = permit.token_id = grant->id;
+    if (revoked_links()->contains(grant->id)) return std::string(link_revoked);
     if (now_unix_s < grant->expires_unix_s) return *grant;
     return "this link has expired: ask for a new one";
   }
   return "the access token is not valid here";
 }
 
-bool AccessControl::is_static_token(std::string_view token) {
-  if (!token_file_.given()) return false;
-  const std::lock_guard lock(mutex_);
+const std::vector<AccessControl::StaticToken>& AccessControl::static_tokens() {
   if (token_file_.changed()) read_again("the tokens", [&] { read_token_file(); });
+  return tokens_;
+}
+
+std::string AccessControl::id_of_static(std::string_view token) {
+  if (!token_file_.given()) return {};
+  const std::lock_guard lock(mutex_);
   const TokenDigest digest = digest_of(token);
-  bool found = false;
-  for (const TokenDigest& known : tokens_) found |= equal_in_constant_time(known, digest);
-  return found;
+  const StaticToken* found = nullptr;
+  for (const StaticToken& known : static_tokens())
+    if (equal_in_constant_time(known.digest, digest)) found = &known;
+  return found ? found->id : std::string();
+}
+
+bool AccessControl::ended(std::string_view token_id) {
+  if (token_id.empty()) return !open_ && (token_file_.given() || !key_.empty());
+  if (!token_id.starts_with(static_prefix)) return revoked_links()->contains(token_id);
+  const std::lock_guard lock(mutex_);
+  return std::ranges::count(static_tokens(), token_id, &StaticToken::id) == 0;
 }
 
 RevokedLinks AccessControl::revoked_links() {
@@ -198,14 +210,15 @@ RevokedLinks AccessControl::revoked_links() {
 }
 
 void AccessControl::read_token_file() {
-  std::vector<TokenDigest> tokens;
+  std::vector<StaticToken> tokens;
   for (const ListFile::Entry& entry : token_file_.read()) {
     if (entry.text.size() < min_token_bytes || entry.text.size() > max_token_bytes)
       throw InputError(
           entry.place, {},
           fmt::format("a token has {} to {} characters", min_token_bytes, max_token_bytes),
           "make one: openssl rand -hex 16");
-    tokens.push_back(digest_of(entry.text));
+    tokens.push_back({digest_of(entry.text),
+                      std::string(static_prefix) + keyed_name(name_purpose, entry.text, own_key_)});
   }
   if (tokens.empty())
     throw InputError(token_file_.source(), {}, "no token in it", "make one: openssl rand -hex 16");

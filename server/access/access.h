@@ -47,9 +47,11 @@ std::chrono::seconds parse_duration(std::string_view text);
 /// "author" may change files in scenes' folders. Thread-safe.
 class AccessControl {
  public:
-  /// An empty path disables that kind of token. Throws InputError if a file cannot be read.
+  /// An empty path disables that kind of token. `own_key`: of what the server signs for its
+  /// own clients; servers of a fleet share it. Throws InputError if a file cannot be read.
   AccessControl(std::filesystem::path token_file, const std::filesystem::path& key_file,
-                bool open = false, std::filesystem::path revoked_links = {});
+                bool open = false, std::filesystem::path revoked_links = {},
+                std::string own_key = random_key());
 
   /// Returns what `token` permits. `resolve` gives the id of the scene that it names. The files of
   /// tokens and of revoked links are reread after a change; if that fails, the last valid content
@@ -58,20 +60,30 @@ class AccessControl {
 
   /// Returns the links that are revoked by now.
   RevokedLinks revoked_links();
+  [[nodiscard]] const std::string& own_key() const { return own_key_; }
+  /// See Ended.
+  bool ended(std::string_view token_id);
 
  private:
-  /// Returns the grant of a valid token, or why it is invalid. Sets `link_id` to that of a genuine
-  /// link.
+  /// Returns the grant of a valid token, or why it is invalid. Fills in the ids of `permit`.
   std::variant<LinkGrant, std::string> read(std::string_view token, std::int64_t now_unix_s,
-                                            std::string& link_id);
+                                            Permit& permit);
   void read_token_file();
   void read_revoked_links();
-  bool is_static_token(std::string_view token);
+  struct StaticToken {
+    TokenDigest digest;
+    std::string id;
+  };
+  /// The tokens of the file by now. The mutex is held.
+  const std::vector<StaticToken>& static_tokens();
+  /// Returns the id of a static token; empty: it is none.
+  std::string id_of_static(std::string_view token);
 
   const bool open_;
+  const std::string own_key_;
   std::mutex mutex_;
   ListFile token_file_;
-  std::vector<TokenDigest> tokens_;
+  std::vector<StaticToken> tokens_;
   ListFile revoked_file_;
   RevokedLinks revoked_ = std::make_shared<LinkIds>();
   std::string key_;  // not changed once constructed

@@ -37,9 +37,15 @@ struct Permit {
 
   Check check;
   std::string link_id{};  // of a genuine link, even if it is refused; empty: the token is no link
+  std::string
+      token_id{};  // of a link or a static token, see Ended; empty: it has no right by itself
   std::int64_t expires_unix_s = std::numeric_limits<std::int64_t>::max();  // of a link
 };
 using Authorize = std::function<Permit(const std::string& token)>;
+
+/// True if the token with this id has ended while the server runs: the link was revoked, or the
+/// static token has left its file. Empty: true where nobody may see anything without a token.
+using Ended = std::function<bool(std::string_view token_id)>;
 
 using LinkIds = std::set<std::string, std::less<>>;
 /// Ids of revoked links. Never null.

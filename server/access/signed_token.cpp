@@ -91,6 +91,14 @@ std::optional<std::string> read_signed_token(std::string_view purpose, std::stri
   return payload;
 }
 
+std::string keyed_name(std::string_view purpose, std::string_view text, std::string_view key) {
+  constexpr std::size_t name_bytes = 16;
+  std::string name;
+  for (const char byte : hmac(purpose, text, key).substr(0, name_bytes))
+    name += fmt::format("{:02x}", static_cast<unsigned char>(byte));
+  return name;
+}
+
 std::string random_key() {
   const auto bytes = random_bytes<32>();
   return {bytes.begin(), bytes.end()};

@@ -15,6 +15,10 @@ std::string sign_token(std::string_view purpose, std::string_view payload, std::
 std::optional<std::string> read_signed_token(std::string_view purpose, std::string_view token,
                                              std::string_view key);
 
+/// A name for a secret text, 128 bits in hexadecimal, that tells nothing of it to those without
+/// `key`. Servers with the key give it the same name.
+std::string keyed_name(std::string_view purpose, std::string_view text, std::string_view key);
+
 /// SHA-256. Texts are compared by digest, so that the time taken does not tell where they differ.
 using TokenDigest = std::array<unsigned char, 32>;
 TokenDigest digest_of(std::string_view text);

@@ -1,14 +1,12 @@
 #include "server/films/film_artist.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/image/panorama.h"
 #include "render_core/image/png.h"
@@ -17,100 +15,133 @@
 namespace catgs {
 namespace {
 
+using namespace std::chrono_literals;
+
 constexpr float detail_px = 0.5f;  // of a scene in pages
 constexpr int part_px = 1024;
+constexpr auto look_every = 20ms;  // while nothing is drawn
+// Shares of the time that a picture takes, about.
+constexpr double until_written = 0.85, until_assembled = 0.6;
+
+/// Tells how far a job is, and lets go of its scene where a visitor needs the memory.
+class Progress {
+ public:
+  Progress(FilmScene& scene, const OnDrawn& on_drawn) : scene_(scene), on_drawn_(on_drawn) {}
+
+  /// `steps` steps lead from the present share to this one.
+  void begin(double share, std::size_t steps) {
+    step_ = (share - share_) / static_cast<double>(steps);
+    last_ = share;
+  }
+  /// A part was drawn.
+  void drawn() {
+    advance();
+    report();
+  }
+  /// A step was made that takes little time.
+  void step() {
+    advance();
+    look();
+  }
+  /// Looks whether the job is to end, or its scene to go.
+  void look() {
+    if (Clock::now() - reported_ >= look_every) report();
+  }
+
+ private:
+  void advance() { share_ = std::min(share_ + step_, last_); }
+  void report() {
+    scene_.give_way();
+    on_drawn_(share_, Clock::now() - reported_);
+    reported_ = Clock::now();
+  }
+
+  FilmScene& scene_;
+  const OnDrawn& on_drawn_;
+  double share_ = 0.0, step_ = 0.0, last_ = 0.0;
+  TimePoint reported_ = Clock::now();
+};
 
 FrameRequest request_of(const SceneEntry& scene, const FilmView& view, glm::ivec2 size_px) {
   FrameRequest request;
   request.camera = make_camera(view.world_from_camera, size_px,
                                focal_from_fov_y(view.fov_y_rad, size_px.y), scene.facts.near_z);
   request.background = colour_of(scene.facts.about.background_rgb);
-  request.detail_px = scene.in_pages ? detail_px : 0.0f;
   request.waits_for_pages = true;
   return request;
 }
 
-void render(View& view, const FrameRequest& request, FrameView& frame) {
-  const RenderStatus status = view.render(request, frame);
+void render(FilmScene& scene, FrameRequest request, FrameView& frame) {
+  request.detail_px = scene.entry().in_pages ? detail_px : 0.0f;
+  const RenderStatus status = scene.view().render(request, frame);
   if (!status.ok()) throw std::runtime_error(status.message);
 }
 
-/// Draws pictures in parts, and tells after each one.
-class Parts {
- public:
-  Parts(Renderer& renderer, int pictures, const OnDrawn& on_drawn)
-      : view_(renderer.make_view({Pipeline::exact, PixelFormat::rgb_f32})),
-        pictures_(pictures),
-        on_drawn_(on_drawn) {}
-
-  /// `take(x, y, rgb)` gets each pixel.
-  template <typename Take>
-  void draw(const FrameRequest& whole, const Take& take) {
-    const glm::ivec2 size_px = whole.camera.size_px;
-    const glm::ivec2 parts = (size_px + part_px - 1) / part_px;
-    for (int i = 0; i < parts.x * parts.y; ++i) {
-      const TimePoint start = Clock::now();
-      const glm::ivec2 from = glm::ivec2(i % parts.x, i / parts.x) * part_px;
-      FrameRequest part = whole;
-      part.camera = cropped(whole.camera, from, glm::min(glm::ivec2(part_px), size_px - from));
-      FrameView frame;
-      render(*view_, part, frame);
-      for (int y = 0; y < part.camera.size_px.y; ++y) {
-        const auto* row = reinterpret_cast<const float*>(
-            frame.planes[0].data + frame.planes[0].stride_bytes * static_cast<std::size_t>(y));
-        for (int x = 0; x < part.camera.size_px.x; ++x)
-          take(from.x + x, from.y + y, row + std::size_t{3} * static_cast<std::size_t>(x));
-      }
-      const double of_picture = static_cast<double>(i + 1) / (parts.x * parts.y);
-      // Writing the file takes its time, too.
-      on_drawn_(0.95 * (drawn_ + of_picture) / pictures_, Clock::now() - start);
+/// Draws a picture in parts. `take(x, y, rgb)` gets each pixel. `share`: of the job, afterwards.
+template <typename Take>
+void draw_parts(FilmScene& scene, const FrameRequest& whole, Progress& progress, double share,
+                const Take& take) {
+  const glm::ivec2 size_px = whole.camera.size_px;
+  const glm::ivec2 parts = (size_px + part_px - 1) / part_px;
+  progress.begin(share, static_cast<std::size_t>(parts.x * parts.y));
+  for (int i = 0; i < parts.x * parts.y; ++i) {
+    const glm::ivec2 from = glm::ivec2(i % parts.x, i / parts.x) * part_px;
+    FrameRequest part = whole;
+    part.camera = cropped(whole.camera, from, glm::min(glm::ivec2(part_px), size_px - from));
+    FrameView frame;
+    render(scene, part, frame);
+    for (int y = 0; y < part.camera.size_px.y; ++y) {
+      const auto* row = reinterpret_cast<const float*>(
+          frame.planes[0].data + frame.planes[0].stride_bytes * static_cast<std::size_t>(y));
+      for (int x = 0; x < part.camera.size_px.x; ++x)
+        take(from.x + x, from.y + y, row + std::size_t{3} * static_cast<std::size_t>(x));
     }
-    ++drawn_;
+    progress.drawn();
   }
-
- private:
-  std::unique_ptr<View> view_;
-  const int pictures_;
-  const OnDrawn& on_drawn_;
-  int drawn_ = 0;
-};
-
-std::uint8_t byte_of(float value) {
-  return static_cast<std::uint8_t>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f)));
 }
 
-void draw_picture(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
-                  const OnDrawn& on_drawn) {
+void draw_picture(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
   const glm::ivec2 size_px = wish.size_px;
   const auto width = static_cast<std::size_t>(size_px.x);
   std::vector<std::uint8_t> bytes(3 * width * static_cast<std::size_t>(size_px.y));
-  Parts(*scene.renderer, 1, on_drawn)
-      .draw(request_of(scene, wish.views.front(), size_px), [&](int x, int y, const float* rgb) {
-        std::uint8_t* const to =
-            bytes.data() + 3 * (width * static_cast<std::size_t>(y) + static_cast<std::size_t>(x));
-        for (int c = 0; c < 3; ++c) to[c] = byte_of(rgb[c]);
-      });
-  write_png(file.path(), size_px, bytes);
+  draw_parts(scene, request_of(scene.entry(), wish.views.front(), size_px), progress, until_written,
+             [&](int x, int y, const float* rgb) {
+               std::uint8_t* const to = bytes.data() + 3 * (width * static_cast<std::size_t>(y) +
+                                                            static_cast<std::size_t>(x));
+               for (int c = 0; c < 3; ++c) to[c] = byte_of(rgb[c]);
+             });
+  scene.let_go();
+  progress.begin(1.0, static_cast<std::size_t>(size_px.y));
+  write_png(file.path(), size_px, bytes, [&] { progress.step(); });
 }
 
-void draw_around(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
-                 const OnDrawn& on_drawn) {
-  FrameRequest request = request_of(scene, wish.views.front(), wish.size_px);
-  request.camera.world_from_camera = levelled(request.camera.world_from_camera, scene.facts.up);
-  Parts parts(*scene.renderer, 6, on_drawn);
+void draw_around(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
+  FrameRequest request = request_of(scene.entry(), wish.views.front(), wish.size_px);
+  request.camera.world_from_camera =
+      levelled(request.camera.world_from_camera, scene.entry().facts.up);
   ThreadPool own(1);  // helpers would not be there for visitors meanwhile
-  const Image image = draw_panorama(request, wish.size_px, own, [&](const FrameRequest& of_side) {
+  constexpr double sides = 6.0;
+  const auto rows = static_cast<std::size_t>(wish.size_px.y);
+  int drawn = 0;
+  const auto draw_side = [&](const FrameRequest& of_side) {
     Image side{of_side.camera.size_px, {}};
     side.rgb.resize(3 * static_cast<std::size_t>(side.size_px.x) *
                     static_cast<std::size_t>(side.size_px.y));
-    parts.draw(of_side, [&](int x, int y, const float* rgb) {
-      const auto at = static_cast<std::size_t>(y) * static_cast<std::size_t>(side.size_px.x) +
-                      static_cast<std::size_t>(x);
-      std::copy_n(rgb, 3, side.rgb.data() + 3 * at);
-    });
+    draw_parts(scene, of_side, progress, until_written * (drawn + until_assembled) / sides,
+               [&](int x, int y, const float* rgb) {
+                 const auto at =
+                     static_cast<std::size_t>(y) * static_cast<std::size_t>(side.size_px.x) +
+                     static_cast<std::size_t>(x);
+                 std::copy_n(rgb, 3, side.rgb.data() + 3 * at);
+               });
+    progress.begin(until_written * ++drawn / sides, rows);
     return side;
-  });
-  write_png(file.path(), image);
+  };
+  const Image image =
+      draw_panorama(request, wish.size_px, own, draw_side, [&] { progress.step(); });
+  scene.let_go();
+  progress.begin(1.0, rows);
+  write_png(file.path(), image, {}, [&] { progress.step(); });
 }
 
 bool same(const FilmView& a, const FilmView& b) {
@@ -119,38 +150,41 @@ bool same(const FilmView& a, const FilmView& b) {
          a.fov_y_rad == b.fov_y_rad;
 }
 
-void draw_frames(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
-                 const OnDrawn& on_drawn) {
-  const auto view = scene.renderer->make_view({Pipeline::exact, PixelFormat::i420});
-  const auto video = make_mp4_file({file.path(), wish.size_px, film_fps, 1});
+void draw_frames(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
+  const auto video =
+      make_mp4_file({file.path(), wish.size_px, film_fps, 1, [&] { progress.look(); }});
   FrameView frame;
   const std::size_t count = wish.views.size();
+  progress.begin(1.0, count);
   for (std::size_t i = 0; i < count; ++i) {
-    const TimePoint start = Clock::now();
-    if (i == 0 || !same(wish.views[i], wish.views[i - 1]))
-      render(*view, request_of(scene, wish.views[i], wish.size_px), frame);
+    if (!scene.has_view() || !same(wish.views[i], wish.views[i - 1]))
+      render(scene, request_of(scene.entry(), wish.views[i], wish.size_px), frame);
     video->write(frame);
     if (file.size() > most_film_bytes)
       throw NotDrawn(fmt::format("the film is larger than {} MiB", most_film_bytes >> 20));
-    on_drawn(static_cast<double>(i + 1) / static_cast<double>(count), Clock::now() - start);
+    progress.drawn();
   }
+  scene.let_go();
   video->finish();
 }
 
-void draw(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+void draw(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
           const OnDrawn& on_drawn) {
-  if (wish.kind == FilmKind::film) return draw_frames(wish, scene, file, on_drawn);
-  if (wish.kind == FilmKind::panorama) return draw_around(wish, scene, file, on_drawn);
-  draw_picture(wish, scene, file, on_drawn);
+  const bool film = wish.kind == FilmKind::film;
+  FilmScene scene(take, film ? PixelFormat::i420 : PixelFormat::rgb_f32);
+  Progress progress(scene, on_drawn);
+  if (film) return draw_frames(wish, scene, file, progress);
+  if (wish.kind == FilmKind::panorama) return draw_around(wish, scene, file, progress);
+  draw_picture(wish, scene, file, progress);
 }
 
 }  // namespace
 
 /// The file has no name, so that its folder tells operators where there is no room.
-void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+void draw_film(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
                const OnDrawn& on_drawn) {
   try {
-    draw(wish, scene, file, on_drawn);
+    draw(wish, take, file, on_drawn);
   } catch (const InputError& failure) {
     std::string why = failure.what();
     const std::string path = file.path();

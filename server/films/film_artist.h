@@ -6,14 +6,14 @@
 
 #include "server/base/clock.h"
 #include "server/base/result_file.h"
+#include "server/films/film_scene.h"
 #include "server/films/film_wish.h"
-#include "server/scenes/scene_entry.h"
 
 namespace catgs {
 
-/// Called after each part of a picture and each frame of a film, with the share that is drawn and
-/// the time that this part took. It may wait, for others to have the machine, and may throw to
-/// cancel.
+/// Called after each part of a picture and each frame of a film, and every 20 ms while they are put
+/// together and written: with the share that is done, and the time since the call before. It may
+/// wait, for others to have the machine, and may throw to cancel.
 using OnDrawn = std::function<void(double share, Clock::duration took)>;
 
 /// Why something is not drawn, in words for its author.
@@ -24,10 +24,10 @@ struct NotDrawn : std::runtime_error {
 /// The largest result, bytes.
 inline constexpr std::uint64_t most_film_bytes = std::uint64_t{512} << 20;
 
-/// Draws a picture (PNG) or a film (MP4, 30 frames a second) of the scene into `file`, on this
-/// thread. Large pictures are drawn in parts. Throws NotDrawn, and other
-/// exceptions with words for operators.
-void draw_film(const FilmWish& wish, const SceneEntry& scene, ResultFile& file,
+/// Draws a picture (PNG) or a film (MP4, 30 frames a second) of the scene that `take` returns into
+/// `file`, on this thread. Large pictures are drawn in parts. Throws NotDrawn, and other exceptions
+/// with words for operators.
+void draw_film(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
                const OnDrawn& on_drawn);
 
 }  // namespace catgs

@@ -2,11 +2,39 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include "server/access/signed_token.h"
 
 namespace catgs {
+namespace {
+
+using Weight = std::function<std::uint64_t(const FilmJob& job)>;
+
+/// Clears the ids of jobs until the others weigh no more than `most`: of the owner whose jobs weigh
+/// most, the one that ended first. The one that ended last stays in any case.
+void keep_within(std::vector<FilmJob>& jobs, std::uint64_t most, const Weight& weight) {
+  while (true) {
+    std::uint64_t sum = 0;
+    std::map<std::string_view, std::uint64_t> of_owner;
+    std::vector<FilmJob*> kept;
+    for (FilmJob& job : jobs) {
+      const std::uint64_t weighs = job.id.empty() ? 0 : weight(job);
+      if (weighs == 0) continue;
+      sum += weighs;
+      of_owner[job.owner] += weighs;
+      kept.push_back(&job);
+    }
+    if (sum <= most || kept.size() < 2) return;
+    std::ranges::stable_sort(kept, {}, &FilmJob::changed);
+    kept.pop_back();
+    const auto share = [&](const FilmJob* job) { return of_owner.at(job->owner); };
+    (*std::ranges::max_element(kept, {}, share))->id.clear();  // the first of several
+  }
+}
+
+}  // namespace
 
 bool has_ended(const FilmReport& job) {
   return job.state != FilmState::waiting && job.state != FilmState::drawing;
@@ -23,8 +51,8 @@ std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_i
   if (std::ranges::count(jobs_, FilmState::waiting, &FilmJob::state) >=
       static_cast<std::ptrdiff_t>(most_waiting))
     return Refused{false};
-  const FilmReport report{.kind = wish.kind, .changed = clock_()};
-  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(owner), std::move(wish)});
+  const FilmReport report{.kind = wish.kind, .owner = std::move(owner), .changed = clock_()};
+  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(wish)});
   return jobs_.back().id;
 }
 
@@ -103,16 +131,13 @@ void FilmQueue::end(FilmJob& job, FilmState state) {
 
 std::vector<FilmJob> FilmQueue::drop_old() {
   const TimePoint now = clock_();
-  std::size_t kept = 0;
-  std::uint64_t bytes = 0;
-  for (auto job = jobs_.rbegin(); job != jobs_.rend(); ++job) {  // the newest first
-    if (!has_ended(*job)) continue;
-    bytes += job->result ? job->result->size() : 0;
-    // The newest one is kept in any case.
-    if (now - job->changed > kept_for || ++kept > most_kept ||
-        (kept > 1 && bytes > most_kept_bytes))
-      job->id.clear();
-  }
+  for (FilmJob& job : jobs_)
+    if (has_ended(job) && now - job.changed > kept_for) job.id.clear();
+  keep_within(jobs_, most_results, [](const FilmJob& job) { return job.result ? 1u : 0u; });
+  keep_within(jobs_, most_result_bytes,
+              [](const FilmJob& job) { return job.result ? job.result->size() : 0; });
+  keep_within(jobs_, most_without_result,
+              [](const FilmJob& job) { return has_ended(job) && !job.result ? 1u : 0u; });
   const auto old =
       std::ranges::stable_partition(jobs_, [](const FilmJob& job) { return !job.id.empty(); });
   std::vector<FilmJob> dropped(std::make_move_iterator(old.begin()),

@@ -22,6 +22,7 @@ enum class FilmState { waiting, drawing, done, failed, cancelled };
 /// The facts of a job that its author is told.
 struct FilmReport {
   FilmKind kind = FilmKind::picture;
+  std::string owner{};  // id of the token that ordered it: one job at a time for each
   FilmState state = FilmState::waiting;
   double share = 0.0;  // drawn
   std::string error{};
@@ -35,17 +36,18 @@ bool has_ended(const FilmReport& job);
 struct FilmJob : FilmReport {
   std::string id;  // whoever knows it may ask for the result
   std::string scene_id;
-  std::string owner;  // who ordered it: one job at a time for each
   FilmWish wish;
 };
 
 /// The orders of authors: one is drawn at a time, and a few wait. Results are kept for an hour,
-/// within bounds of number and bytes; the oldest go first. Thread-safe.
+/// within bounds of number and bytes. Beyond a bound the owner who has most loses the oldest, so
+/// nobody's orders throw away the results of others. Thread-safe.
 class FilmQueue {
  public:
   static constexpr std::size_t most_waiting = 4;
-  static constexpr std::size_t most_kept = 8;  // that have ended
-  static constexpr std::uint64_t most_kept_bytes = std::uint64_t{1} << 30;
+  static constexpr std::size_t most_results = 8;
+  static constexpr std::uint64_t most_result_bytes = std::uint64_t{1} << 30;
+  static constexpr std::size_t most_without_result = 32;  // that have failed or were cancelled
   static constexpr std::chrono::hours kept_for{1};
 
   explicit FilmQueue(std::function<TimePoint()> clock = Clock::now) : clock_(std::move(clock)) {}
@@ -72,8 +74,8 @@ class FilmQueue {
  private:
   FilmJob* known(std::string_view id);
   void end(FilmJob& job, FilmState state);
-  /// Returns the jobs that are too old: large files take time to close, so the caller lets go of
-  /// them once the mutex is free.
+  /// Returns the jobs that are too old or too many: large files take time to close, so the caller
+  /// lets go of them once the mutex is free.
   [[nodiscard]] std::vector<FilmJob> drop_old();
 
   const std::function<TimePoint()> clock_;

@@ -21,6 +21,7 @@ using namespace std::chrono_literals;
 
 constexpr auto longest_job = 2h;
 constexpr auto look_again = 20ms;
+constexpr auto ask_again = 250ms;  // for a scene
 constexpr std::string_view folder = "/api/films/", file_part = "/file", cancel_part = "/cancel";
 
 /// Thrown by the artist's callback.
@@ -51,14 +52,14 @@ FilmStudio::FilmStudio(Surroundings around)
     : around_(std::move(around)), artist_([this](const std::stop_token& stop) { work(stop); }) {}
 
 FilmStudio::~FilmStudio() {
-  clerk_.join();
   artist_.request_stop();
+  clerk_.join();
   artist_.join();
 }
 
 std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
   if (const auto id = job_of(request.path, file_part)) {
-    const auto job = queue_.find(*id);
+    const auto job = find(*id);
     if (job && !has_ended(*job))
       return text_response(
           404, fmt::format("404: it is not ready yet: {}{} says how far it is\n", folder, *id));
@@ -75,7 +76,7 @@ std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
   }
   const auto id = job_of(request.path, "");
   if (!id) return std::nullopt;
-  const auto job = queue_.find(*id);
+  const auto job = find(*id);
   if (!job) return no_such_job();
   constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
   nlohmann::json report = {{"state", names[static_cast<std::size_t>(job->state)]},
@@ -86,12 +87,17 @@ std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
   return json_response(200, report);
 }
 
+std::optional<FilmReport> FilmStudio::find(std::string_view id) {
+  auto job = queue_.find(id);
+  return job && !around_.ended(job->owner) ? job : std::nullopt;
+}
+
 bool FilmStudio::cancels(const HttpRequest& request) {
   return job_of(request.path, cancel_part).has_value();
 }
 
 std::optional<HttpResponse> FilmStudio::refuse_cancel(const HttpRequest& request) {
-  const auto job = queue_.find(*job_of(request.path, cancel_part));
+  const auto job = find(*job_of(request.path, cancel_part));
   return job && !has_ended(*job) ? std::nullopt : std::optional(no_such_job());
 }
 
@@ -151,14 +157,24 @@ void FilmStudio::work(const std::stop_token& stop) {
   }
 }
 
+void FilmStudio::check(const FilmJob& job, double share, const std::stop_token& stop) {
+  if (around_.ended(job.owner)) queue_.cancel(job.id);
+  if (stop.stop_requested() || !queue_.drawn(job.id, share)) throw Cancelled();
+}
+
 void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   const TimePoint started = Clock::now();
+  double done = 0.0;
+  std::optional<int> content;
+  const auto take = [&] {
+    const LeasedScene scene = take_scene(job, done, content, stop);
+    content = scene.lease->content();
+    return scene;
+  };
   try {
-    const auto scene = scene_of(job.scene_id, stop);
-    if (!scene) throw NotDrawn("the scene is not in memory: open it, and order again");
     const auto file = std::make_shared<ResultFile>();
-    draw_film(job.wish, *scene, *file, [&](double share, Clock::duration took) {
-      if (stop.stop_requested() || !queue_.drawn(job.id, share)) throw Cancelled();
+    draw_film(job.wish, take, *file, [&](double share, Clock::duration took) {
+      check(job, done = share, stop);
       if (Clock::now() - started > longest_job) throw NotDrawn("it takes longer than two hours");
       std::unique_lock lock(mutex_);
       if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
@@ -174,13 +190,34 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   }
 }
 
-std::shared_ptr<const SceneEntry> FilmStudio::scene_of(const std::string& id,
-                                                       const std::stop_token& stop) {
-  auto answer = std::make_shared<std::promise<std::shared_ptr<const SceneEntry>>>();
+LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::optional<int> content,
+                                   const std::stop_token& stop) {
+  const TimePoint begun = Clock::now();
+  while (true) {
+    const LeasedScene scene = ask_for_scene(job, content.has_value(), stop);
+    if (scene.lease && content && scene.lease->content() != *content)
+      throw NotDrawn("the scene's file has changed meanwhile: order again");
+    if (scene.lease) return scene;
+    if (!content) throw NotDrawn("the scene is not in memory: open it, and order again");
+    if (scene.gone) throw NotDrawn("the scene is not offered any more");
+    if (Clock::now() - begun >= around_.longest_wait)
+      throw NotDrawn(
+          "visitors of other scenes need the memory of this one: order again when it is quieter");
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, ask_again, [] { return false; });
+    lock.unlock();
+    check(job, share, stop);
+  }
+}
+
+LeasedScene FilmStudio::ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop) {
+  auto answer = std::make_shared<std::promise<LeasedScene>>();
   auto future = answer->get_future();
-  boost::asio::post(around_.io, [this, id, answer] { answer->set_value(around_.in_memory(id)); });
+  boost::asio::post(around_.io, [lease = around_.lease, id = job.scene_id, again, answer] {
+    answer->set_value(lease(id, again));
+  });
   while (future.wait_for(look_again) != std::future_status::ready)
-    if (stop.stop_requested()) return nullptr;
+    if (stop.stop_requested()) throw Cancelled();
   return future.get();
 }
 

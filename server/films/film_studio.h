@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <future>
@@ -13,10 +14,11 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
 
+#include "server/access/authorize.h"
 #include "server/films/film_queue.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
-#include "server/scenes/scene_entry.h"
+#include "server/scenes/scene_lease.h"
 
 namespace catgs {
 
@@ -26,18 +28,22 @@ namespace catgs {
 ///   GET /api/films/JOB           {"state", "share", "seconds_left", "bytes", "error"}
 ///   GET /api/films/JOB/file      the result
 ///   PUT /api/films/JOB/cancel
-/// A JOB is 128 random bits: whoever knows it may ask for it. While visitors look at scenes, at
-/// most half of the time is spent on drawing.
+/// A JOB is 128 random bits: whoever knows it may ask for it, until its order's link is revoked.
+/// While visitors look at scenes, at most half of the time is spent on drawing. A scene whose
+/// memory visitors need is let go between two pictures.
 class FilmStudio {
  public:
   struct Surroundings {
     boost::asio::io_context& io;  // runs the session thread
-    /// The scene, if it is in memory. Session thread.
-    std::function<std::shared_ptr<const SceneEntry>(const std::string& scene_id)> in_memory;
+    /// A hold on a scene in memory. `again`: the job had it before. Session thread.
+    std::function<LeasedScene(const std::string& scene_id, bool again)> lease;
     std::function<bool()> visitors_look;  // any thread
+    Ended ended;                          // any thread
+    /// A job whose scene was let go ends if it does not get the scene again in this time.
+    std::chrono::milliseconds longest_wait = std::chrono::minutes(10);
   };
   explicit FilmStudio(Surroundings around);
-  ~FilmStudio();  // ends the present job after its current part
+  ~FilmStudio();  // ends the present job after its current part or row
   FilmStudio(const FilmStudio&) = delete;
   FilmStudio& operator=(const FilmStudio&) = delete;
 
@@ -49,17 +55,25 @@ class FilmStudio {
   /// Refuses such a PUT unless its job waits or is being drawn.
   std::optional<HttpResponse> refuse_cancel(const HttpRequest& request);
   std::future<HttpResponse> cancel(const HttpRequest& request);
-  /// The caller has checked that the sender may save the scene. One whose place is abandoned
-  /// meanwhile orders nothing.
+  /// The caller has checked that the sender may save the scene. `owner`: id of its token. One whose
+  /// place is abandoned meanwhile orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
                                   std::shared_ptr<const UploadPlace> place);
 
  private:
+  /// Nothing: there is no such job, or its link was revoked.
+  std::optional<FilmReport> find(std::string_view id);
   HttpResponse take(std::string scene_id, std::string owner, const std::string& json);
   void work(const std::stop_token& stop);
   void draw(const FilmJob& job, const std::stop_token& stop);
-  /// Null: it is not in memory, or the server stops.
-  std::shared_ptr<const SceneEntry> scene_of(const std::string& id, const std::stop_token& stop);
+  /// Throws Cancelled when the server stops, or the job, of which `share` is done, was cancelled or
+  /// its link revoked.
+  void check(const FilmJob& job, double share, const std::stop_token& stop);
+  /// Waits for a lease of the job's scene. `content`: of the lease before; nothing: there was none.
+  /// Throws NotDrawn, or as check().
+  LeasedScene take_scene(const FilmJob& job, double share, std::optional<int> content,
+                         const std::stop_token& stop);
+  LeasedScene ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop);
 
   const Surroundings around_;
   FilmQueue queue_;

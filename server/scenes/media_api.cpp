@@ -122,7 +122,7 @@ Refusal MediaApi::refusal(const HttpRequest& request, std::string_view scene_id)
   return permit_of(parts_.authorize, request).refusal(scene_id, Use::list);
 }
 
-/// A pass says: the scene, when it ends, and the link that it was made for.
+/// A pass says: the scene, when it ends, and the id of the token that it was made for.
 bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) const {
   constexpr std::string_view argument = "pass=";
   for (const std::string& text : request.arguments) {
@@ -133,10 +133,10 @@ bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) c
     const std::string_view rest = std::string_view(*pass).substr(scene_id.size() + 1);
     std::int64_t end_s = 0;
     const auto [stop, error] = std::from_chars(rest.data(), rest.data() + rest.size(), end_s);
-    const std::string_view link = rest.substr(static_cast<std::size_t>(stop - rest.data()));
-    if (error != std::errc() || !link.starts_with('\n') || parts_.now_unix_s() >= end_s)
+    const std::string_view token = rest.substr(static_cast<std::size_t>(stop - rest.data()));
+    if (error != std::errc() || !token.starts_with('\n') || parts_.now_unix_s() >= end_s)
       return false;
-    return !parts_.revoked_links()->contains(link.substr(1));
+    return !parts_.ended(token.substr(1));
   }
   return false;
 }
@@ -146,7 +146,7 @@ HttpResponse MediaApi::make_pass(const HttpRequest& request, const std::string& 
   if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
   const std::int64_t end_s = std::min(parts_.now_unix_s() + pass_valid_s, permit.expires_unix_s);
   return text_response(
-      200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.link_id),
+      200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.token_id),
                       parts_.key));
 }
 

@@ -25,7 +25,7 @@ namespace catgs {
 /// - GET media/NAME: the file, for those who may see the scene. Elements of a page cannot send a
 ///   token, so a pass in the address does as well: media/NAME?pass=PASS.
 /// - GET media-pass: such a pass, for the holder of a token. It is good for this scene and some
-///   hours, and for no longer than the link is.
+///   hours, and for no longer than the token is.
 /// - GET media: the list of files, for authors.
 /// - PUT media/NAME: adds or replaces a file, for authors.
 class MediaApi {
@@ -33,7 +33,7 @@ class MediaApi {
   struct Parts {
     const SceneLibrary& scenes;
     Authorize authorize;
-    std::function<RevokedLinks()> revoked_links;
+    Ended ended;
     std::string key;  // of passes; servers of a fleet share it
     std::function<std::int64_t()> now_unix_s;
   };

@@ -159,6 +159,10 @@ std::string SceneApi::saved_scene(const HttpRequest& request) const {
   return scenes_.resolve(author_scene_of(request.path).value());
 }
 
+std::string SceneApi::author_of(const HttpRequest& request) const {
+  return permit_of(authorize_, request).token_id;
+}
+
 bool SceneApi::orders_film(const HttpRequest& request) {
   return scene_of(request.path, films_part).has_value();
 }

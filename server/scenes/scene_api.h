@@ -29,6 +29,8 @@ class SceneApi {
   std::optional<HttpResponse> refuse_upload(const HttpRequest& request);
   /// The id of the scene that an accepted request saves, or orders a film of.
   [[nodiscard]] std::string saved_scene(const HttpRequest& request) const;
+  /// The id of the token that an accepted request came with.
+  [[nodiscard]] std::string author_of(const HttpRequest& request) const;
   /// True if the request orders a film.
   [[nodiscard]] static bool orders_film(const HttpRequest& request);
 

@@ -51,6 +51,7 @@ struct LoadedScene {
   std::shared_ptr<const SceneEntry> entry;
   std::string error{};
   bool unusable_tree = false;  // the error is that of the scene's tree
+  bool gave_way = false;       // no error: a visitor's load came first
 };
 
 /// Loads one scene in a form and builds its renderer with the options and pool of `core`. `id_of`

@@ -121,7 +121,7 @@ std::string SceneGrounds::kept_or_computed(const std::string& scene_id,
   return bytes;
 }
 
-/// The files that were used last stay.
+/// The files that were used last stay, but a few of one scene.
 void SceneGrounds::keep(const fs::path& path, const std::string& bytes) const {
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   std::error_code error;
@@ -132,7 +132,13 @@ void SceneGrounds::keep(const fs::path& path, const std::string& bytes) const {
       files.emplace_back(entry->last_write_time(gone), entry->path());
   }
   std::ranges::sort(files, std::greater<>());
-  for (std::size_t k = max_kept - 1; k < files.size(); ++k) fs::remove(files[k].second, error);
+  const std::string scene = path.filename().string().substr(0, ground_scene_digits);
+  std::size_t kept = 1, of_scene = 1;  // with the new one
+  for (const auto& [used, file] : files) {
+    const bool too_many_of_scene =
+        file.filename().string().starts_with(scene) && ++of_scene > max_kept_of_scene;
+    if (too_many_of_scene || ++kept > max_kept) fs::remove(file, error);
+  }
   try {
     overwrite_file(path, bytes, "make room in --cache-dir");
   } catch (const InputError& failure) {  // a full disk costs the next start some time

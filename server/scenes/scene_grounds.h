@@ -37,6 +37,7 @@ class SceneGrounds {
 
   static constexpr std::size_t max_file_bytes = 8 << 20;  // served to pages
   static constexpr std::size_t max_kept = 256;            // in the folder
+  static constexpr std::size_t max_kept_of_scene = 4;     // as authors save it again and again
 
  private:
   [[nodiscard]] std::string find_now(const std::string& scene_id, const GroundSource& source) const;

@@ -17,6 +17,7 @@
 #include "server/base/scene_id.h"
 #include "server/scenes/ground_of_scene.h"
 #include "server/scenes/scene_catalog.h"
+#include "server/scenes/scene_refusal.h"
 
 namespace catgs {
 namespace {
@@ -27,10 +28,6 @@ constexpr auto scan_interval = 30s;
 constexpr auto retry_after_failure = 30s;
 constexpr auto seek_ground_again_after = 5min;
 constexpr std::size_t most_prepared = 2;
-
-std::vector<std::filesystem::path> paths(const std::vector<std::string>& names) {
-  return {names.begin(), names.end()};
-}
 
 ResidencyLimits residency_limits(const ServerConfig& config) {
   constexpr std::uint64_t megabyte = 1'000'000;
@@ -44,37 +41,8 @@ std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
   return keys;
 }
 
-std::string megabytes(std::uint64_t bytes) {
-  return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes));
-}
-
 /// A quarter of the processors. Trees are built while visitors look.
 int builder_threads(const RendererOptions& core) { return std::max(1, core.pool->threads() / 4); }
-
-ErrorMessage refusal(SceneResidency::Wish wish, const std::string& id, std::uint64_t bytes) {
-  if (wish == SceneResidency::Wish::too_large)
-    return {ErrorCode::unknown_scene,
-            fmt::format("the scene \"{}\" takes {}, more than this server has for scenes",
-                        name_in(id), megabytes(bytes)),
-            false};
-  if (wish == SceneResidency::Wish::no_room)
-    return {
-        ErrorCode::server_full,
-        fmt::format("there is no memory for \"{}\" while others look at other scenes: try again "
-                    "in a minute",
-                    name_in(id)),
-        false};
-  return {ErrorCode::server_full, "other scenes are being loaded: try again in a minute", false};
-}
-
-/// The pages of trees that are in memory.
-std::vector<ScenePages> pages_of(const SceneShelf& shelf) {
-  std::vector<ScenePages> all;
-  for (const auto& [id, book] : shelf.books())
-    if (book.entry)
-      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
-  return all;
-}
 
 GroundSource ground_source_of(const SceneBook& book, const SceneTrees& trees,
                               const ServerConfig& config) {
@@ -93,34 +61,34 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core,
                            boost::asio::io_context& io, Metrics& metrics,
                            std::function<TimePoint()> clock)
     : config_(config),
-      core_(std::move(core)),
       io_(io),
       metrics_(metrics),
       clock_(std::move(clock)),
-      trees_(config, builder_threads(core_), io, metrics, clock_,
+      trees_(config, builder_threads(core), io, metrics, clock_,
              [this](std::uint64_t bytes) { return residency_.could_fit(bytes); }),
       look_{SceneIds(config.scenes, config.scene_folders), chosen_levels(config), trees_.enabled()},
-      folders_(paths(config.scene_folders), look_, keys_of(config.scenes)),
+      loads_(config_, core, look_.ids, trees_),
+      folders_({config.scene_folders.begin(), config.scene_folders.end()}, look_,
+               keys_of(config.scenes)),
       residency_(residency_limits(config)),
-      in_use_([this](const std::string& id) {
+      use_of_([this](const std::string& id) {
         const SceneBook* const book = shelf_.find(id);
-        return book && book->in_use();
+        return book ? book->use() : SceneUse::none;
       }),
-      redrawing_(shelf_, trees_, residency_, io, loader_,
-                 [this](const auto& found, const auto& form) { return load(found, form); }),
-      grounds_(config.cache_dir, builder_threads(core_), io) {
-  core_.pages = std::make_shared<PagePools>(tree_memory(config));
+      redrawing_(
+          shelf_, trees_, residency_, io, loader_,
+          [this](const auto& found, const auto& form) { return loads_.load(found, form, false); }),
+      posters_(
+          shelf_, trees_, residency_, io, loader_,
+          [this](const auto& found, const auto& form) { return loads_.load(found, form, true); },
+          [this] { publish(); }),
+      grounds_(config.cache_dir, builder_threads(core), io) {
   pin_scenes();
   if (config_.scene_folders.empty())
     merge({});
   else
     open_folders();
-  // The first scenes decide whether the server uses GPUs. With GPUs, the processors are reserved
-  // for encoding, so a later scene that no GPU can load is refused. Without, pools and budgets
-  // count no GPU.
-  const bool on_gpus = core_.devices && !core_.devices->views().empty();
-  if (core_.kind == RendererKind::automatic)
-    core_.kind = on_gpus ? RendererKind::cuda : RendererKind::cpu;
+  loads_.keep_core();
   publish();
 }
 
@@ -132,7 +100,7 @@ void SceneLibrary::pin_scenes() {
     FoundScene found;
     found.location = scene;
     if (trees_.enabled() && scene.format != nullptr) found = look_at_scene(scene, look_);
-    auto entry = load_now(found);
+    auto entry = loads_.load_now(found);
     const std::string id = entry->facts.scene_id;
     residency_.pin(id, need_of(*entry));
     SceneBook& book = shelf_.book_of(id);
@@ -183,39 +151,18 @@ void SceneLibrary::open_folders() {
 void SceneLibrary::begin_with(const std::string& id) {
   const FoundScene& found = shelf_.books().at(id).found;
   const TimePoint now = clock_();
-  const auto wish = residency_.want(id, trees_.need_of(found), now, in_use_);
+  const auto wish = residency_.want(id, trees_.need_of(found), now, use_of_);
   if (wish != SceneResidency::Wish::awaited)
     throw InputError("--scene-memory", {}, refusal(wish, id, trees_.bytes_of(found)).message);
-  residency_.next(now, in_use_);
-  auto entry = load_now(found);
+  residency_.next(now, use_of_);
+  auto entry = loads_.load_now(found);
   shelf_.prefer(id);
   on_loaded(id, {std::move(entry)}, now, clock_());
 }
 
 SceneLibrary::~SceneLibrary() {
-  stopping_ = true;
+  loads_.stop();
   loader_.join();
-}
-
-std::shared_ptr<const SceneEntry> SceneLibrary::load_now(const FoundScene& found) {
-  const std::string spec = found.location.given.string();
-  const auto load_as = [&](const SceneForm& form) {
-    return load_scene(
-        found.location, form, [&](const auto& name) { return look_.ids.id_of(spec, name); },
-        config_, core_, core_.pool->threads());
-  };
-  try {
-    if (trees_.ready(found)) return load_as(*trees_.form_of(found));
-  } catch (const UnusableTree& error) {
-    trees_.discard(found, error.what());
-  }
-  try {
-    if (!trees_.form_of(found)) trees_.build_now(found);
-  } catch (const InputError& error) {
-    trees_.give_up(found, error.what());
-    throw;  // as a whole it does not fit
-  }
-  return load_as(trees_.form_of(found).value_or(SceneForm()));
 }
 
 SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
@@ -235,8 +182,13 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
     return SceneAwaited{trees_.estimate(book.found)};
   }
   const std::uint64_t bytes = trees_.bytes_of(book.found);
-  const auto wish = residency_.want(id, trees_.need_of(book.found), now, in_use_);
-  if (wish != SceneResidency::Wish::awaited) return refusal(wish, id, bytes);
+  const auto wish = residency_.want(id, trees_.need_of(book.found), now, use_of_);
+  if (wish != SceneResidency::Wish::awaited) {
+    if (redrawing_.holds_two_forms()) return SceneAwaited{1s};  // one of them goes soon
+    return refusal(wish, id, bytes);
+  }
+  if (residency_.visitor_waits() && (residency_.loads_in_background() || posters_.busy()))
+    loads_.give_way();
   start_next(now);
   const double seconds = static_cast<double>(bytes) / bytes_per_second_;
   return SceneAwaited{std::chrono::seconds(1 + static_cast<std::int64_t>(seconds))};
@@ -244,12 +196,14 @@ SceneAnswer SceneLibrary::want(const std::string& id, TimePoint now) {
 
 void SceneLibrary::prepare(const std::string& id, TimePoint now) {
   const SceneBook* const book = shelf_.find(id);
-  if (!book || book->gone || book->entry || residency_.busy() || making_poster_) return;
+  if (!book || book->gone || book->entry || residency_.busy() || posters_.busy()) return;
   if (!trees_.form_of(book->found)) return;
   std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
   if (prepared_.size() >= most_prepared) {
     const auto [oldest, since] = prepared_.front();
-    if (in_use_(oldest) || now - since < std::chrono::seconds(config_.scene_residency_s)) return;
+    if (use_of_(oldest) != SceneUse::none ||
+        now - since < std::chrono::seconds(config_.scene_residency_s))
+      return;
     release(oldest);
     prepared_.erase(prepared_.begin());
   }
@@ -259,25 +213,8 @@ void SceneLibrary::prepare(const std::string& id, TimePoint now) {
 
 void SceneLibrary::want_poster(const std::string& id) {
   boost::asio::post(io_, [this, id] {
-    SceneBook* const book = shelf_.find(id);
-    if (!book || making_poster_ || residency_.busy()) return;
-    const auto form = trees_.form_of(book->found);
-    if (!form || book->gone || book->entry || book->poster || book->poster_tried ||
-        !residency_.has_room(trees_.need_of(book->found)))
-      return;
-    making_poster_ = book->poster_tried = true;
-    boost::asio::post(loader_, [this, id, form = *form, found = book->found] {
-      // The scene goes here, on the loader's thread: that may wait for the device.
-      std::shared_ptr<const std::string> poster;
-      if (const LoadedScene loaded = load(found, form); loaded.entry) poster = loaded.entry->poster;
-      boost::asio::post(io_, [this, id, poster, changed = found.changed] {
-        making_poster_ = false;
-        SceneBook* const made_for = shelf_.find(id);
-        if (!made_for || made_for->found.changed != changed) return;
-        if (!made_for->poster) made_for->poster = poster;
-        publish();
-      });
-    });
+    if (!posters_.busy() && !residency_.busy()) loads_.begin_in_background();
+    posters_.want(id);
   });
 }
 
@@ -305,9 +242,12 @@ void SceneLibrary::on_tick(TimePoint now) {
   std::vector<std::string> outdated;
   for (const auto& [id, book] : shelf_.books()) {
     if (!book.entry || book.pinned) continue;
-    if (book.in_use())
-      residency_.note_use(id, now);
-    else if (book.outdated || book.gone)
+    const SceneUse use = book.use();
+    if (use != SceneUse::none) residency_.note_use(id, now);
+    if (use == SceneUse::visitors || !(book.outdated || book.gone)) continue;
+    if (use == SceneUse::background)
+      book.recall();
+    else
       outdated.push_back(id);
   }
   for (const std::string& id : outdated) release(id);
@@ -315,19 +255,24 @@ void SceneLibrary::on_tick(TimePoint now) {
   for (const std::string& id : too_large) release(id);
   if (changed) publish();
   start_next(now);
-  metrics_.set_pages(pages_of(shelf_));
-  if (next_scan_ && now >= *next_scan_) start_scan(now);
+  metrics_.set_pages(shelf_.pages());
+  if (next_scan_ && now >= *next_scan_) start_scan();
 }
 
 void SceneLibrary::start_next(TimePoint now) {
-  const auto step = residency_.next(now, in_use_);
+  const auto step = residency_.next(now, use_of_);
   if (!step) return;
-  for (const std::string& id : step->release) release(id);
-  const FoundScene& found = shelf_.books().at(step->load).found;
+  for (const std::string& id : step->recall) shelf_.books().at(id).recall();
+  if (step->recall.empty()) carry_out(*step, false, now);
+}
+
+void SceneLibrary::carry_out(const SceneResidency::Step& step, bool gives_way, TimePoint now) {
+  for (const std::string& id : step.release) release(id);
+  const FoundScene& found = shelf_.books().at(step.load).found;
   const auto form = trees_.form_of(found);
-  if (!form) return residency_.failed(step->load);  // its tree was lost; visitors ask again
-  boost::asio::post(loader_, [this, id = step->load, found, form = *form, now] {
-    auto loaded = std::make_shared<LoadedScene>(load(found, form));
+  if (!form) return residency_.failed(step.load);  // its tree was lost; visitors ask again
+  boost::asio::post(loader_, [this, id = step.load, found, form = *form, gives_way, now] {
+    auto loaded = std::make_shared<LoadedScene>(loads_.load(found, form, gives_way));
     boost::asio::post(
         io_, [this, id, loaded, now] { on_loaded(id, std::move(*loaded), now, clock_()); });
   });
@@ -347,27 +292,12 @@ void SceneLibrary::release(const std::string& id) {
   boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
 }
 
-LoadedScene SceneLibrary::load(const FoundScene& found, const SceneForm& form) const {
-  try {
-    // Half of the processors stay free for the visitors' frames.
-    const int threads = std::max(1, core_.pool->threads() / 2);
-    return {load_scene(
-        found.location, form, [&](const auto&) { return found.id; }, config_, core_, threads,
-        [this](double) {
-          if (stopping_) throw std::runtime_error("the server stops");
-        })};
-  } catch (const UnusableTree& error) {
-    return {nullptr, error.what(), true};
-  } catch (const std::exception& error) {
-    return {nullptr, error.what()};
-  }
-}
-
 void SceneLibrary::on_loaded(const std::string& id, LoadedScene loaded, TimePoint started,
                              TimePoint now) {
   SceneBook* const book = shelf_.find(id);
   if (!loaded.entry || !book) {
     residency_.failed(id);
+    if (loaded.gave_way) return start_next(now);
     if (loaded.unusable_tree) {
       if (book) trees_.discard(book->found, loaded.error);
       return start_next(now);  // visitors ask again
@@ -396,6 +326,26 @@ std::shared_ptr<const SceneEntry> SceneLibrary::in_memory(const std::string& id)
   return it == shelf_.books().end() ? nullptr : it->second.entry;
 }
 
+LeasedScene SceneLibrary::lease(const std::string& id, bool again) {
+  const SceneBook* const book = shelf_.find(id);
+  if (!book) return {.gone = true};
+  const LeasedScene none{.gone = book->gone};
+  if (in_memory(id)) {
+    // While a visitor needs the room, no scene is held that visitors have left.
+    const bool leaves = book->outdated || book->gone || residency_.visitor_waits();
+    return leaves && !book->pinned && book->use() != SceneUse::visitors ? none : book->lease();
+  }
+  const TimePoint now = clock_();
+  if (!again || book->gone || posters_.busy() || (book->retry_at && now < *book->retry_at) ||
+      !trees_.form_of(book->found))
+    return none;
+  const auto step = residency_.next_in_background(id, trees_.need_of(book->found), now, use_of_);
+  if (!step) return none;
+  loads_.begin_in_background();
+  carry_out(*step, true, now);
+  return none;
+}
+
 void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntry> entry) {
   SceneBook* const book = shelf_.find(id);
   if (!book || !book->entry) return;
@@ -403,15 +353,14 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
     entry = redrawn(*entry, *book->entry);
   if (book->entry->renderer != entry->renderer) return;
   const GroundSource before = ground_source_of(*book, trees_, config_);
-  book->entry = std::move(entry);
+  book->entry = unleased(std::move(entry), book->entry->renderer);
   if (!book->outdated && !same_ground(before, ground_source_of(*book, trees_, config_)))
     book->ground.reset();
   publish();
 }
 
-void SceneLibrary::start_scan(TimePoint now) {
-  next_scan_ = now + scan_interval;
-  if (std::exchange(scanning_, true)) return;
+void SceneLibrary::start_scan() {
+  next_scan_.reset();
   boost::asio::post(loader_, [this] {
     auto found = std::make_shared<std::optional<std::vector<FoundScene>>>();
     try {
@@ -420,7 +369,7 @@ void SceneLibrary::start_scan(TimePoint now) {
       log_warning({.event = "scene_folder_unreadable"}, "{}", error.what());
     }
     boost::asio::post(io_, [this, found] {
-      scanning_ = false;
+      next_scan_ = clock_() + scan_interval;
       if (*found) merge(**std::move(found));
     });
   });

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -16,6 +15,8 @@
 #include "server/config/config.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_grounds.h"
+#include "server/scenes/scene_loader.h"
+#include "server/scenes/scene_posters.h"
 #include "server/scenes/scene_redrawing.h"
 #include "server/scenes/scene_residency.h"
 #include "server/scenes/scene_shelf.h"
@@ -58,6 +59,9 @@ class SceneLibrary final : public SceneSource {
 
   /// Returns null if the scene is not in memory.
   [[nodiscard]] std::shared_ptr<const SceneEntry> in_memory(const std::string& id) const;
+  /// A background job's hold on a scene in memory, unless that has to leave. `again`: the job had
+  /// the scene before, and it is loaded for it where that costs no visitor anything.
+  [[nodiscard]] LeasedScene lease(const std::string& id, bool again = false);
   /// Replaces the scene's entry for clients that arrive from now on. Does nothing if the scene was
   /// reloaded since `entry` was made.
   void revise(const std::string& id, std::shared_ptr<const SceneEntry> entry);
@@ -68,9 +72,7 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const {
     return shelf_.listing();
   }
-  /// Any thread. Loads a scene for a moment to make its poster, once and one at a time. Does
-  /// nothing while a visitor waits for a scene, or where it would not fit beside the scenes in
-  /// memory.
+  /// Any thread. See ScenePosters.
   void want_poster(const std::string& id);
   /// Any thread. Finds where people can walk in a scene in memory, one scene at a time. Does
   /// nothing where that is known or under way.
@@ -81,42 +83,37 @@ class SceneLibrary final : public SceneSource {
   void open_folders();
   /// Loads a scene of the folders as the default one. Throws InputError.
   void begin_with(const std::string& id);
-  /// Loads a scene on this thread, before the server runs. Throws InputError.
-  std::shared_ptr<const SceneEntry> load_now(const FoundScene& found);
-  /// Loads a scene on the loader's thread.
-  LoadedScene load(const FoundScene& found, const SceneForm& form) const;
   void start_next(TimePoint now);
+  void carry_out(const SceneResidency::Step& step, bool gives_way, TimePoint now);
   void on_loaded(const std::string& id, LoadedScene loaded, TimePoint started, TimePoint now);
   void release(const std::string& id);
-  void start_scan(TimePoint now);
+  void start_scan();
   void merge(std::vector<FoundScene> found);
   /// Updates listing() and the metrics.
   void publish();
 
   const ServerConfig config_;
-  RendererOptions core_;  // for later scenes; fixed once the first ones are loaded
   boost::asio::io_context& io_;
   Metrics& metrics_;
   const std::function<TimePoint()> clock_;
   SceneTrees trees_;
   const SceneLook look_;
+  SceneLoader loads_;
   SceneFolders folders_;  // used on the loader's thread after construction
   SceneShelf shelf_;
   SceneResidency residency_;
-  const SceneResidency::InUse in_use_;
+  const SceneResidency::UseOf use_of_;
   double bytes_per_second_ = 100e6;     // of the last load
-  std::optional<TimePoint> next_scan_;  // nothing without folders
-  bool scanning_ = false;
-  bool making_poster_ = false;
+  std::optional<TimePoint> next_scan_;  // nothing without folders, and while a scan runs
   struct Prepared {
     std::string id;
     TimePoint since;
   };
   std::vector<Prepared> prepared_;  // and not entered since, oldest first
 
-  std::atomic<bool> stopping_{false};
   boost::asio::thread_pool loader_{1};
   SceneRedrawing redrawing_;
+  ScenePosters posters_;
   SceneGrounds grounds_;
 };
 

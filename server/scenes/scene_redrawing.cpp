@@ -26,6 +26,11 @@ std::shared_ptr<const SceneEntry> SceneRedrawing::newer_form(const SceneEntry& s
   return former && former->renderer == seen.renderer ? book->second.entry : nullptr;
 }
 
+bool SceneRedrawing::holds_two_forms() const {
+  return busy_ || std::ranges::any_of(shelf_.books(),
+                                      [](const auto& of) { return of.second.former != nullptr; });
+}
+
 SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
   Tick tick;
   for (auto& [id, book] : shelf_.books()) {
@@ -48,7 +53,7 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
       trees_.order(found, false);
     else if (residency_.has_room(trees_.need_of(found)))
       start(id);
-    else if (!book.pinned && !book.in_use())
+    else if (!book.pinned && book.use() == SceneUse::none)
       tick.too_large.push_back(id);  // its next visitor gets the tree
   }
   changed_ |= trees_.on_tick(now);
@@ -83,6 +88,7 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   residency_.resize(id, need_of(*book->entry).with(need_of(*loaded.entry)));
   book->former = std::exchange(book->entry, redrawn(*book->entry, *loaded.entry));
   book->tree_lost = false;
+  book->recall();  // jobs go on with the new form
   changed_ = true;
   log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
            id);

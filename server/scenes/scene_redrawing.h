@@ -44,6 +44,9 @@ class SceneRedrawing {
   };
   Tick on_tick(TimePoint now);
 
+  /// True while a scene takes the memory of two forms. One of them goes soon.
+  [[nodiscard]] bool holds_two_forms() const;
+
   /// See SceneSource.
   [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) const;
 

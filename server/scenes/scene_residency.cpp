@@ -1,6 +1,7 @@
 #include "server/scenes/scene_residency.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace catgs {
@@ -10,44 +11,76 @@ void SceneResidency::pin(const std::string& id, const SceneNeed& need) {
 }
 
 SceneResidency::Wish SceneResidency::want(const std::string& id, const SceneNeed& need,
-                                          TimePoint now, const InUse& in_use) {
+                                          TimePoint now, const UseOf& use_of) {
   if (resident(id)) {
     note_use(id, now);
     return Wish::resident;
   }
+  if (loading_ == id) in_background_ = false;
   if (awaited(id)) return Wish::awaited;
   if (!could_fit(need)) return Wish::too_large;
-  if (!room_for(need, [&](const auto& other, const Resident&) { return !in_use(other); }))
+  if (!room_for(need, [&](const auto& other, const Resident&) {
+        return use_of(other) != SceneUse::visitors;
+      }))
     return Wish::no_room;
-  if (waiting_) return Wish::busy;
+  // A load for a background job gives way soon. Until then, each who asks again is told to wait.
+  if (waiting_) return in_background_ ? Wish::awaited : Wish::busy;
   waiting_ = {id, need};
   return Wish::awaited;
 }
 
-std::optional<SceneResidency::Step> SceneResidency::next(TimePoint now, const InUse& in_use) {
+std::optional<SceneResidency::Step> SceneResidency::next(TimePoint now, const UseOf& use_of) {
   if (!waiting_ || !loading_.empty()) return std::nullopt;
-  const auto unused = [&](const std::string& id, const Resident&) { return !in_use(id); };
-  if (!room_for(waiting_->need, unused)) {
+  const auto may_go = [&](const std::string& id, const Resident&) {
+    return use_of(id) != SceneUse::visitors;
+  };
+  if (!room_for(waiting_->need, may_go)) {
     // A scene to release came into use. Waiting clients ask again and are told.
     waiting_.reset();
     return std::nullopt;
   }
   auto release = room_for(waiting_->need, [&](const std::string& id, const Resident& resident) {
-    return unused(id, resident) && now - resident.since >= limits_.min_residency;
+    return may_go(id, resident) && now - resident.since >= limits_.min_residency;
   });
   if (!release) return std::nullopt;
-  for (const std::string& id : *release) residents_.erase(id);
-  loading_ = std::exchange(waiting_, std::nullopt)->id;
-  return Step{*std::move(release), loading_};
+  Step recalls;
+  std::ranges::copy_if(*release, std::back_inserter(recalls.recall),
+                       [&](const std::string& id) { return use_of(id) == SceneUse::background; });
+  if (!recalls.recall.empty()) return recalls;
+  return begin(std::exchange(waiting_, std::nullopt)->id, *std::move(release), false);
+}
+
+std::optional<SceneResidency::Step> SceneResidency::next_in_background(const std::string& id,
+                                                                       const SceneNeed& need,
+                                                                       TimePoint now,
+                                                                       const UseOf& use_of) {
+  if (busy() || resident(id)) return std::nullopt;
+  auto release = room_for(need, [&](const std::string& other, const Resident& resident) {
+    return use_of(other) == SceneUse::none &&
+           now - std::max(resident.since, resident.last_use) >= limits_.min_residency;
+  });
+  return release ? std::optional(begin(id, *std::move(release), true)) : std::nullopt;
+}
+
+SceneResidency::Step SceneResidency::begin(const std::string& id, std::vector<std::string> release,
+                                           bool in_background) {
+  for (const std::string& gone : release) residents_.erase(gone);
+  loading_ = id;
+  in_background_ = in_background;
+  return {std::move(release), id};
 }
 
 void SceneResidency::loaded(const std::string& id, const SceneNeed& need, TimePoint now) {
   loading_.clear();
-  residents_.insert_or_assign(id, Resident{need, false, now, now});
+  // One that was loaded for a background job may go as soon as a visitor needs the room.
+  const auto since = std::exchange(in_background_, false) ? now - limits_.min_residency : now;
+  residents_.insert_or_assign(id, Resident{need, false, since, now});
 }
 
 void SceneResidency::failed(const std::string& id) {
-  if (loading_ == id) loading_.clear();
+  if (loading_ != id) return;
+  loading_.clear();
+  in_background_ = false;
 }
 
 void SceneResidency::note_use(const std::string& id, TimePoint now) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/base/clock.h"
+#include "server/scenes/scene_lease.h"
 
 namespace catgs {
 
@@ -41,14 +42,15 @@ struct SceneNeed {
 inline constexpr std::size_t most_scenes_in_pages = 32;
 
 /// Decides which scenes are in memory, which is loaded next and which are released for it. One
-/// scene loads at a time and one may wait. Scenes in use are never released; of the others, the
-/// least recently used goes first. Until a scene is loaded, its size is the one in its header. The
-/// first scene in pages takes the whole pool, and the others nothing beside it.
+/// scene loads at a time and one may wait. Scenes that visitors use are never released; of the
+/// others, the least recently used goes first. Background jobs let go of a scene before it is
+/// released. Until a scene is loaded, its size is the one in its header. The first scene in pages
+/// takes the whole pool, and the others nothing beside it.
 /// Pure: time comes in, decisions come out. Not thread-safe.
 class SceneResidency {
  public:
-  /// True if a scene in memory is in use.
-  using InUse = std::function<bool(const std::string& id)>;
+  /// Who uses a scene in memory.
+  using UseOf = std::function<SceneUse(const std::string& id)>;
 
   explicit SceneResidency(ResidencyLimits limits) : limits_(limits) {}
 
@@ -59,19 +61,25 @@ class SceneResidency {
     resident,   // it is in memory
     awaited,    // it is being loaded, or next
     too_large,  // there will never be room for it
-    no_room,    // those in memory are in use
+    no_room,    // visitors look at those in memory
     busy,       // one is being loaded and one waits
   };
-  Wish want(const std::string& id, const SceneNeed& need, TimePoint now, const InUse& in_use);
+  Wish want(const std::string& id, const SceneNeed& need, TimePoint now, const UseOf& use_of);
 
   /// The next step for the waiting scene. Do `release` first, because it makes room.
   struct Step {
     std::vector<std::string> release;
     std::string load;
+    std::vector<std::string> recall{};  // from background jobs; ask for a step again afterwards
   };
   /// Returns nothing while a scene is loading, or while the scenes to release are too recent. The
-  /// caller carries the step out and then calls loaded() or failed().
-  std::optional<Step> next(TimePoint now, const InUse& in_use);
+  /// caller carries the step out and then calls loaded() or failed(), unless it is to recall.
+  std::optional<Step> next(TimePoint now, const UseOf& use_of);
+  /// The step that loads a scene for a background job; nothing: not now. It is no step for scenes
+  /// that visitors wait for, and it releases none that anybody has used within the least time that
+  /// scenes stay.
+  std::optional<Step> next_in_background(const std::string& id, const SceneNeed& need,
+                                         TimePoint now, const UseOf& use_of);
 
   void loaded(const std::string& id, const SceneNeed& need, TimePoint now);
   void failed(const std::string& id);
@@ -88,6 +96,10 @@ class SceneResidency {
   }
   /// True while a scene is being loaded or waits for it.
   [[nodiscard]] bool busy() const { return !loading_.empty() || waiting_; }
+  /// True while a scene is being loaded that no visitor waits for.
+  [[nodiscard]] bool loads_in_background() const { return in_background_; }
+  /// True while a visitor waits for a scene that is not being loaded yet.
+  [[nodiscard]] bool visitor_waits() const { return waiting_.has_value(); }
   /// True if it fits without releasing a scene.
   [[nodiscard]] bool has_room(const SceneNeed& need) const { return fits({}, need); }
   /// True if it fits when all scenes have left that may leave.
@@ -111,6 +123,7 @@ class SceneResidency {
   /// The memory of the scenes but for those that are `gone`.
   [[nodiscard]] std::uint64_t bytes_without(const std::vector<std::string>& gone,
                                             bool pool_stays) const;
+  Step begin(const std::string& id, std::vector<std::string> release, bool in_background);
   /// Whether a scene fits when those are `gone`.
   [[nodiscard]] bool fits(const std::vector<std::string>& gone, const SceneNeed& need) const;
   /// The least recently used scenes to release for a scene, if `may_go` permits enough of them.
@@ -122,6 +135,7 @@ class SceneResidency {
   const ResidencyLimits limits_;
   std::map<std::string, Resident> residents_;
   std::string loading_;
+  bool in_background_ = false;  // loading_ is for a job that nobody waits for
   std::optional<Waiting> waiting_;
 };
 

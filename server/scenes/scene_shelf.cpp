@@ -8,6 +8,14 @@
 
 namespace catgs {
 
+SceneUse SceneBook::use() const {
+  // Leases are counted before holders. A lease that ends in between makes the scene look less used,
+  // and then it is still held: it does not go.
+  const int leased = leases->held;
+  if (held(entry, leased) || held(former, leased)) return SceneUse::visitors;
+  return held(entry, 0) || former ? SceneUse::background : SceneUse::none;
+}
+
 SceneBook* SceneShelf::find(const std::string& id) {
   const auto it = books_.find(id);
   return it == books_.end() ? nullptr : &it->second;
@@ -32,6 +40,7 @@ void SceneShelf::merge(std::vector<FoundScene> found,
     book.gone = false;
     if (book.found.changed != scene.changed) {
       book.outdated = book.entry != nullptr;
+      ++book.content;
       book.poster.reset();
       book.poster_tried = false;
       // Visitors still see the former scene, and no file tells its ground any more.
@@ -77,6 +86,14 @@ std::string SceneShelf::resolve(std::string_view wish) const {
       return known->second;
   }
   return std::string(wish);
+}
+
+std::vector<ScenePages> SceneShelf::pages() const {
+  std::vector<ScenePages> all;
+  for (const auto& [id, book] : books_)
+    if (book.entry)
+      for (const PageFigures& figures : book.entry->renderer->pages()) all.push_back({id, figures});
+  return all;
 }
 
 void SceneShelf::publish(const std::function<std::string(const FoundScene&)>& state_of) {

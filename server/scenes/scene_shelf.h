@@ -12,9 +12,11 @@
 #include <vector>
 
 #include "server/base/clock.h"
+#include "server/base/page_metrics.h"
 #include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_grounds.h"
+#include "server/scenes/scene_lease.h"
 
 namespace catgs {
 
@@ -47,17 +49,25 @@ struct SceneBook {
   bool gone = false;                    // the file is gone: not offered any more
   bool told = false;                    // the log has named its path, as others share its name
   std::optional<TimePoint> retry_at{};  // after a failure
+  int content = 0;                      // counts the contents that the file has had
+  std::shared_ptr<SceneLeases> leases = std::make_shared<SceneLeases>();
 
-  /// True if a user besides the shelf holds the scene.
-  [[nodiscard]] bool in_use() const { return former || held_elsewhere(entry); }
-  /// True if only the shelf holds the former entry.
-  [[nodiscard]] bool former_is_left() const { return former && !held_elsewhere(former); }
-
- private:
   /// Scenes come into use on the session thread only, so an unused scene stays unused. Uses may end
   /// elsewhere without harm.
-  static bool held_elsewhere(const std::shared_ptr<const SceneEntry>& entry) {
-    return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1);
+  [[nodiscard]] SceneUse use() const;
+  /// True if only the shelf holds the former entry.
+  [[nodiscard]] bool former_is_left() const { return former && !held(former, 0); }
+  /// A background job's hold on the entry.
+  [[nodiscard]] LeasedScene lease() const {
+    return leased(*entry, leases, outdated ? content - 1 : content);
+  }
+  /// Background jobs let go of the scene soon.
+  void recall() const { ++leases->recalls; }
+
+ private:
+  /// True if a user besides the shelf and so many leases holds the scene.
+  static bool held(const std::shared_ptr<const SceneEntry>& entry, int leases) {
+    return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1 + leases);
   }
 };
 
@@ -87,6 +97,8 @@ class SceneShelf {
   /// not tell them apart.
   [[nodiscard]] std::string resolve(std::string_view wish) const;
 
+  /// The pages of trees that are in memory.
+  [[nodiscard]] std::vector<ScenePages> pages() const;
   /// Updates listing(). `state_of`: what is done for a scene at the moment, for people.
   void publish(const std::function<std::string(const FoundScene&)>& state_of);
   /// Any thread.

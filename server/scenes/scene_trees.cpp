@@ -91,7 +91,11 @@ SceneNeed SceneTrees::need_of(const FoundScene& scene) const {
 }
 
 void SceneTrees::order(const FoundScene& scene, bool urgent) {
-  if (given_up(scene) || (running_ && running_->scene.tree == scene.tree)) return;
+  if (given_up(scene)) return;
+  if (running_ && !running_->cancelled && running_->scene.tree == scene.tree) {
+    running_->urgent |= urgent;
+    return;
+  }
   const auto known =
       std::ranges::find_if(waiting_, [&](const Order& o) { return o.scene.tree == scene.tree; });
   if (known != waiting_.end() && (known->urgent || !urgent)) return;
@@ -99,6 +103,9 @@ void SceneTrees::order(const FoundScene& scene, bool urgent) {
   const auto behind = urgent ? std::ranges::find(waiting_, false, &Order::urgent) : waiting_.end();
   waiting_.insert(behind, {scene, urgent});
   changed_ = true;
+  // A tree that nobody waits for is built later.
+  if (urgent && running_ && !running_->urgent && !running_->cancelled.exchange(true))
+    waiting_.push_back({running_->scene, false});
   start_next();
 }
 
@@ -106,6 +113,7 @@ void SceneTrees::start_next() {
   if (running_ || waiting_.empty()) return;
   running_ = std::make_shared<Build>();
   running_->scene = std::move(waiting_.front().scene);
+  running_->urgent = waiting_.front().urgent;
   running_->started = clock_();
   waiting_.pop_front();
   logged_ = running_->started;

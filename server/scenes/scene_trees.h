@@ -48,7 +48,8 @@ class SceneTrees {
   [[nodiscard]] SceneNeed need_of(const FoundScene& scene) const;
 
   /// Orders a scene's tree, unless it is ordered already, or could not be built or used of late.
-  /// `urgent`: visitors wait for it.
+  /// `urgent`: visitors wait for it. Then a build that nobody waits for is cancelled and made
+  /// later.
   void order(const FoundScene& scene, bool urgent);
   /// Builds a scene's tree on this thread, before the server runs. Throws InputError.
   void build_now(const FoundScene& scene);
@@ -77,6 +78,7 @@ class SceneTrees {
   };
   struct Build {
     FoundScene scene;
+    bool urgent = false;
     TimePoint started;
     std::atomic<double> progress{0.0};
     std::atomic<bool> cancelled{false};

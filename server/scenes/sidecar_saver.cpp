@@ -79,7 +79,7 @@ void SidecarSaver::start_next() {
 }
 
 void SidecarSaver::start_save(const SharedRequest& request) {
-  request->entry = scenes_.in_memory(request->scene_id);
+  request->entry = scenes_.lease(request->scene_id).entry;
   if (!request->entry)
     return request->answer.set_value(
         text_response(409, "409: the scene is not in memory: open it, then save\n"));
@@ -182,7 +182,7 @@ void SidecarSaver::finish(Request& request, const Outcome& outcome) {
 }
 
 void SidecarSaver::start_poster(const std::string& scene_id) {
-  auto scene = scenes_.in_memory(scene_id);
+  auto scene = scenes_.lease(scene_id).entry;
   if (!scene) return;
   busy_ = true;
   boost::asio::post(writer_, [this, scene_id, scene = std::move(scene)] {

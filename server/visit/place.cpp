@@ -43,6 +43,21 @@ void present(Place& place, const Present& wish, TimePoint now) {
   audience.presentation().begin(wish, now);
 }
 
+/// True if the visitor begins to lead or to follow. The first tells a whole company, the second
+/// checks a link.
+bool begins_shared_tour(const ClientMessage& message, bool leads) {
+  if (const auto* wish = std::get_if<Present>(&message)) return wish->on && !leads;
+  const auto* wish = std::get_if<Follow>(&message);
+  return wish && !wish->watch_token.empty();
+}
+
+void refuse_shared_tour(Visit& visit, const ClientMessage& message, TimePoint now) {
+  visit.say(ErrorMessage{ErrorCode::rate_limited,
+                         "shared tours begin twice a second at most: try again in a moment", false},
+            now);
+  if (std::holds_alternative<Follow>(message)) visit.say(Lead{LeadState::ended, {}, 0, {}}, now);
+}
+
 void ping(Place& place, const ClientConnection& from, Admissions& admissions, const Ping& ping,
           TimePoint now) {
   const bool leads = place.audience().presentation().since().has_value();
@@ -69,7 +84,8 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       audience_(around.options.max_spectators, std::move(address)),
       tally_(around.counts),
       pings_(2.0, 2.0, Clock::now()),
-      preparations_(0.1, 3.0, Clock::now()) {}
+      preparations_(0.1, 3.0, Clock::now()),
+      shared_tours_(2.0, 8.0, Clock::now()) {}
 
 Place::~Place() { executor_->close(std::move(stream_)); }
 
@@ -82,6 +98,9 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   if (hello && visit_.life().state() == VisitState::awaiting_hello)
     return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
   if (visit_.life().state() == VisitState::live) {
+    if (begins_shared_tour(message, audience_.presentation().since().has_value()) &&
+        !shared_tours_.take(received))
+      return refuse_shared_tour(visit_, message, received);
     if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);

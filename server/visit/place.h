@@ -114,7 +114,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   SessionUsage usage_;
   Audience audience_;
   VisitTally tally_;
-  RateLimit pings_, preparations_;
+  RateLimit pings_, preparations_, shared_tours_;
 };
 
 /// Returns null if no place has this id.

@@ -9,9 +9,11 @@
 namespace catgs {
 namespace {
 
+using namespace std::chrono_literals;
+
 // Enough for a smooth way between two of them. Followers draw at their own rate.
-constexpr std::chrono::milliseconds between_cameras{33};
-constexpr std::chrono::milliseconds between_places{500};
+constexpr auto between_cameras = 33ms;
+constexpr auto between_places = 500ms;
 // Of all in the company. Each may send two a second (Place).
 constexpr double pings_per_second = 10.0;
 
@@ -70,7 +72,8 @@ void Presentation::moved(const PoseSample& camera, TimePoint now) {
   const bool stops = camera.at_rest && !(camera_ && camera_->at_rest);
   camera_ = camera;
   camera_is_new_ = true;
-  if (!camera_told_ || stops || now - *camera_told_ >= between_cameras) tell_camera(now);
+  // A stop may come one interval early, so that followers stop, too. The next camera is then later.
+  if (now >= next_camera_ - (stops ? between_cameras : 0ms)) tell_camera(now);
 }
 
 std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePoint now) {
@@ -111,7 +114,7 @@ void Presentation::tell_followers(const ServerMessage& message) const {
 }
 
 void Presentation::tell_camera(TimePoint now) {
-  camera_told_ = now;
+  next_camera_ = std::max(next_camera_, now) + between_cameras;
   camera_is_new_ = false;
   if (!since_ || followers_.empty()) return;
   Lead lead = told_.value_or(Lead{LeadState::leads, wish_.name, followers(), {}, wish_.pings});

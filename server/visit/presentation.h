@@ -29,7 +29,7 @@ class Presentation {
   [[nodiscard]] bool has(const ClientConnection& follower) const;
 
   /// The leader's camera has moved or has come to rest. Followers hear of it, or of a newer one,
-  /// within 33 ms or by the next news().
+  /// within 33 ms or by the next news(), 30 times a second at most.
   void moved(const PoseSample& camera, TimePoint now);
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
   /// nothing: all know it.
@@ -59,7 +59,7 @@ class Presentation {
   std::optional<Lead> told_;
   std::vector<std::weak_ptr<ClientConnection>> followers_;
   std::optional<PoseSample> camera_;
-  std::optional<TimePoint> camera_told_;
+  TimePoint next_camera_{};  // followers hear of the camera from then on
   bool camera_is_new_ = false;
   std::optional<RateLimit> pings_;
   Company places_told_;

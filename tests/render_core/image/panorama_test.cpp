@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -69,6 +70,19 @@ TEST(Panorama, TheMiddleIsWhereTheCameraLooks) {
   EXPECT_GT(pixel(image, 128, 64).z, 0.999f);
   EXPECT_GT(pixel(image, 192, 64).x, 0.999f) << "to the right";
   EXPECT_LT(pixel(image, 128, 0).y, 0.001f) << "above the picture";
+}
+
+TEST(Panorama, EndsBetweenRows) {
+  ThreadPool pool(1);
+  const auto draw = [](const FrameRequest& r) { return draw_sky(r); };
+  int rows = 0;
+  draw_panorama(at({}), {64, 32}, pool, draw, [&] { ++rows; });
+  EXPECT_EQ(rows, 7 * 32);
+  const auto cancel = [&] {
+    if (--rows == 100) throw std::runtime_error("cancelled");
+  };
+  EXPECT_THROW(draw_panorama(at({}), {64, 32}, pool, draw, cancel), std::runtime_error);
+  EXPECT_EQ(rows, 100);
 }
 
 // Sides that differ fade into each other: no step from pixel to pixel.

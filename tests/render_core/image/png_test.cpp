@@ -66,6 +66,28 @@ TEST_F(Png, RefusesWhatIsNoPicture) {
   EXPECT_THROW(write_png("/nonexistent/folder/a.png", ramp(1, 1)), InputError);
 }
 
+TEST_F(Png, EndsBetweenRowsAndLeavesNoFile) {
+  int rows = 0;
+  const auto count = [&] { ++rows; };
+  write_png(path_, ramp(8, 30), {}, count);
+  EXPECT_EQ(rows, 30);
+  const std::vector<std::uint8_t> bytes(3 * 8 * 30);
+  write_png(path_, {8, 30}, bytes, count);
+  EXPECT_EQ(rows, 60);
+  const auto cancel = [&] {
+    if (++rows == 70) throw std::runtime_error("cancelled");
+  };
+  EXPECT_THROW(write_png(path_, {8, 30}, bytes, cancel), std::runtime_error);
+  EXPECT_EQ(rows, 70);
+  EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
+TEST_F(Png, FullDiskIsNamed) {
+  EXPECT_THAT([&] { write_png("/dev/full", ramp(300, 300)); },
+              ThrowsMessage<InputError>(HasSubstr("is there room?")));
+  EXPECT_TRUE(std::filesystem::exists("/dev/full"));
+}
+
 TEST(CopyImage, FollowsTheStride) {
   const std::vector<float> pixels = {1, 2, 3, 4, 5, 6, -1, -1, 7, 8, 9, 10, 11, 12, -1, -1};
   FrameView frame;

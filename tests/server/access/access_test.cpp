@@ -227,6 +227,30 @@ TEST_F(AccessTest, RevokedLinksHaveANumberAndAForm) {
               ThrowsMessage<InputError>(HasSubstr("more than 100000")));
 }
 
+TEST_F(AccessTest, StaticTokenEndsWhenItLeavesItsFile) {
+  const auto path = folder.write("tokens", "alpha-alpha\nbeta-beta\n");
+  AccessControl access(path, folder.write("key", std::string(key)), false, {}, "own key");
+  AccessControl other(path, {}, false, {}, "own key"), stranger(path, {});
+  const auto id_of = [](AccessControl& by, std::string_view token) {
+    return by.permit(token, 0, one_hall).token_id;
+  };
+  const std::string alpha = id_of(access, "alpha-alpha"), beta = id_of(access, "beta-beta");
+  EXPECT_NE(alpha, beta);
+  EXPECT_EQ(id_of(access, "gamma-gamma"), "");
+  EXPECT_EQ(id_of(other, "alpha-alpha"), alpha) << "servers of a fleet know it";
+  EXPECT_NE(id_of(stranger, "alpha-alpha"), alpha) << "it tells nothing of the token";
+  EXPECT_EQ(access.permit("alpha-alpha", 0, one_hall).link_id, "");
+  EXPECT_FALSE(access.ended(alpha) || access.ended(beta));
+  EXPECT_TRUE(access.ended("")) << "nobody is here without a token";
+  EXPECT_FALSE(AccessControl(path, {}, true).ended(""));
+
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("tokens", "beta-beta\n");
+  std::filesystem::last_write_time(path, later);
+  EXPECT_TRUE(access.ended(alpha));
+  EXPECT_FALSE(access.ended(beta));
+}
+
 TEST_F(AccessTest, StaticTokensAreReadAgain) {
   const auto path = folder.write("tokens", "# first\nalpha-alpha\n");
   AccessControl access(path, {});

@@ -37,27 +37,41 @@ class FilmArtist : public testing::Test {
     view.world_from_camera.position = {0, 0, -6};
   }
   Image drawn(FilmKind kind, glm::ivec2 size_px) {
-    parts = 0;
+    calls = 0;
+    double last_share = 0.0;
     ResultFile file;
-    draw_film({kind, size_px, {view}}, scene, file, [&](double share, Clock::duration) {
-      EXPECT_GT(share, last_share);
+    draw_film({kind, size_px, {view}}, take, file, [&](double share, Clock::duration) {
+      EXPECT_GE(share, last_share);
       last_share = share;
-      ++parts;
+      ++calls;
     });
-    last_share = 0.0;
+    EXPECT_LE(last_share, 1.0);
     return read_png(file.path());
+  }
+  /// True if the job can be cancelled between two shares of it.
+  bool ends_between(double least, double most, FilmKind kind, glm::ivec2 size_px) {
+    ResultFile file;
+    try {
+      draw_film({kind, size_px, {view}}, take, file, [&](double done, Clock::duration) {
+        if (done > least && done < most) throw std::runtime_error("cancelled");
+      });
+    } catch (const std::runtime_error&) {
+      return true;
+    }
+    return false;
   }
 
   SceneEntry scene;
+  const std::shared_ptr<SceneLeases> leases = std::make_shared<SceneLeases>();
+  const FilmScene::Take take = [this] { return leased(scene, leases, 0); };
   FilmView view;
-  int parts = 0;
-  double last_share = 0.0;
+  int calls = 0;
 };
 
 TEST_F(FilmArtist, APictureInPartsIsThePicture) {
   const glm::ivec2 size_px{2200, 1100};
   const Image picture = drawn(FilmKind::picture, size_px);
-  EXPECT_EQ(parts, 6);
+  EXPECT_GE(calls, 6) << "after each part";
   FrameRequest request;
   request.camera = make_camera(view.world_from_camera, size_px,
                                focal_from_fov_y(view.fov_y_rad, size_px.y), 0.2f);
@@ -70,7 +84,33 @@ TEST_F(FilmArtist, APictureInPartsIsThePicture) {
 TEST_F(FilmArtist, APanoramaShowsAllAround) {
   const Image around = drawn(FilmKind::panorama, {256, 128});
   EXPECT_EQ(around.size_px, glm::ivec2(256, 128));
-  EXPECT_EQ(parts, 6) << "a side is one part";
+  EXPECT_GE(calls, 6) << "a side is one part";
+}
+
+TEST_F(FilmArtist, CancelledWhileItIsAssembledOrWritten) {
+  EXPECT_TRUE(ends_between(0.851, 1.0, FilmKind::picture, {2200, 1100})) << "written";
+  EXPECT_TRUE(ends_between(0.80, 0.849, FilmKind::panorama, {2048, 1024})) << "assembled";
+  EXPECT_TRUE(ends_between(0.851, 1.0, FilmKind::panorama, {2048, 1024})) << "written";
+}
+
+TEST_F(FilmArtist, SceneIsLetGoWhereItIsNeededElsewhere) {
+  int taken = 0;
+  const auto take_again = [&] {
+    ++taken;
+    EXPECT_EQ(leases->held, 0) << "before it is taken again";
+    return take();
+  };
+  ResultFile file, undisturbed;
+  const FilmWish wish{FilmKind::picture, {2200, 1100}, {view}};
+  draw_film(wish, take_again, file, [&](double share, Clock::duration) {
+    ++leases->recalls;
+    if (share > 0.851) {
+      EXPECT_EQ(leases->held, 0) << "while the file is written";
+    }
+  });
+  EXPECT_EQ(taken, 3) << "each is let go after the part that follows";
+  draw_film(wish, take, undisturbed, [](double, Clock::duration) {});
+  EXPECT_EQ(read_png(file.path()).rgb, read_png(undisturbed.path()).rgb);
 }
 
 TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
@@ -81,14 +121,14 @@ TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
   }
   ResultFile file;
   int frames = 0;
-  draw_film(wish, scene, file, [&](double, Clock::duration) { ++frames; });
-  EXPECT_EQ(frames, 8);
+  draw_film(wish, take, file, [&](double, Clock::duration) { ++frames; });
+  EXPECT_GE(frames, 8);
   std::array<std::byte, 8> head{};
   ASSERT_TRUE(file.read(0, head));
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(head.data()) + 4, 4), "ftyp");
   frames = 0;
   ResultFile other;
-  EXPECT_THROW(draw_film(wish, scene, other,
+  EXPECT_THROW(draw_film(wish, take, other,
                          [&](double, Clock::duration) {
                            if (++frames == 3) throw std::runtime_error("cancelled");
                          }),

@@ -2,6 +2,9 @@
 
 #include <array>
 #include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -18,11 +21,13 @@ class FilmQueueTest : public testing::Test {
     return id ? *id : "";
   }
   FilmState state(const std::string& id) { return queue.find(id).value().state; }
-  /// Draws what waits.
-  std::string draw(const std::string& owner) {
+  /// Draws what waits. The result has so many bytes.
+  std::string draw(const std::string& owner, std::uint64_t bytes = 0) {
     const std::string id = order(owner);
     EXPECT_TRUE(queue.start_next());
-    queue.finish(id, std::make_shared<ResultFile>());
+    const auto file = std::make_shared<ResultFile>();
+    std::filesystem::resize_file(file->path(), bytes);  // a hole, which takes no room
+    queue.finish(id, file);
     return id;
   }
 
@@ -82,8 +87,54 @@ TEST_F(FilmQueueTest, KeepsResultsForAnHourAndAFewOfThem) {
   now += 2min;
   EXPECT_FALSE(queue.find(first));
   const std::string second = draw("ada");
-  for (std::size_t i = 0; i < FilmQueue::most_kept; ++i) draw("ada");
+  for (std::size_t i = 0; i < FilmQueue::most_results; ++i) draw("ada");
   EXPECT_FALSE(queue.find(second));
+}
+
+TEST_F(FilmQueueTest, CancelledOrdersDropNoResult) {
+  const std::string film = draw("ada");
+  std::string last;
+  for (std::size_t i = 0; i < 3 * FilmQueue::most_without_result; ++i) {
+    last = order("eve");
+    ASSERT_TRUE(queue.cancel(last));
+  }
+  EXPECT_TRUE(queue.find(film));
+  EXPECT_TRUE(queue.find(last)) << "the newest is known";
+}
+
+TEST_F(FilmQueueTest, OwnerOfMostResultsLosesTheOldest) {
+  const std::string film = draw("ada");
+  std::vector<std::string> eves;
+  for (std::size_t i = 0; i < 2 * FilmQueue::most_results; ++i) {
+    now += 1s;
+    eves.push_back(draw("eve"));
+  }
+  EXPECT_TRUE(queue.find(film));
+  EXPECT_FALSE(queue.find(eves.front()));
+  EXPECT_TRUE(queue.find(eves.back()));
+  EXPECT_TRUE(queue.find(eves[eves.size() - (FilmQueue::most_results - 1)]));
+  EXPECT_FALSE(queue.find(eves[eves.size() - FilmQueue::most_results]));
+}
+
+TEST_F(FilmQueueTest, OwnerOfMostBytesLosesTheOldest) {
+  const std::string film = draw("ada", FilmQueue::most_result_bytes / 4);
+  const std::string first = draw("eve", FilmQueue::most_result_bytes / 2);
+  EXPECT_TRUE(queue.find(first));
+  const std::string second = draw("eve", FilmQueue::most_result_bytes / 2);
+  EXPECT_FALSE(queue.find(first));
+  EXPECT_TRUE(queue.find(second));
+  EXPECT_TRUE(queue.find(film));
+}
+
+TEST_F(FilmQueueTest, FloodOfFailuresHidesNoFailureOfOthers) {
+  const std::string failed = order("ada");
+  queue.start_next();
+  queue.fail(failed, "no room");
+  for (std::size_t i = 0; i < 2 * FilmQueue::most_without_result; ++i) {
+    now += 1s;
+    queue.cancel(order("eve"));
+  }
+  EXPECT_EQ(queue.find(failed)->error, "no room");
 }
 
 TEST(ResultFile, HasNoNameAndIsReadByPieces) {

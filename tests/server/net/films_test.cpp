@@ -114,6 +114,32 @@ TEST_F(Films, OfStrangersAreUnknownAndTakeNoPlace) {
   EXPECT_EQ(order(picture, token("author")).status, 202) << "their bodies never come";
 }
 
+TEST_F(Films, ShutNoVisitorOut) {
+  server.reset();
+  for (const char* name : {"barn.ply", "hall.ply"})
+    save_scene(synthesize(SynthKind::city, 3000, 1).cloud, folder / "scenes" / name);
+  server.emplace([&](ServerConfig& config) {
+    config.scenes.clear();
+    config.scene_folders = {(folder / "scenes").string()};
+    config.token_key_file = key_file.string();
+    config.scene_memory_mb = 1;  // for one of them
+    config.scene_residency_s = 0;
+  });
+  const std::string author = token("author");
+  const std::string job = job_of(order(film, author, "barn"));
+  ASSERT_TRUE(eventually([&] { return report(job).at("share") > 0.0; }));
+  WireClient visitor(server->port());
+  v1::ClientMessage hello = hello_message(160, 96, v1::CODEC_H264);
+  hello.mutable_hello()->set_scene_id("hall");
+  hello.mutable_hello()->set_token(author);
+  EXPECT_THAT(visitor.greet(hello).scene().scene_id(), HasSubstr("hall"));
+  EXPECT_EQ(report(job).at("state"), "drawing") << "it waits for its scene";
+  visitor.close(1001);
+  const double share = report(job).at("share");
+  EXPECT_TRUE(eventually([&] { return report(job).at("share") > share; })) << "and goes on";
+  EXPECT_EQ(cancel(job), 200);
+}
+
 TEST_F(Films, NeedASceneInMemory) {
   const std::string job = job_of(order(picture, token("author"), "hall"));
   ASSERT_TRUE(ends(job));

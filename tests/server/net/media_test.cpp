@@ -170,6 +170,23 @@ TEST_F(Media, NeedALinkOrAPassOfTheScene) {
   EXPECT_TRUE(eventually([&] { return get(file + "?pass=" + pass).status == 401; }));
 }
 
+TEST_F(Media, PassEndsWithItsStaticToken) {
+  const auto tokens = folder.write("tokens", "alpha-alpha\nbeta-beta\n");
+  server.emplace([&](ServerConfig& config) {
+    config.scenes = {(folder / "hall.ply").string()};
+    config.token_file = tokens.string();
+  });
+  const std::string alpha = get("media-pass", {}, "alpha-alpha").body;
+  const std::string beta = get("media-pass", {}, "beta-beta").body;
+  const auto status = [&](const std::string& pass) {
+    return get("media/door.jpg?pass=" + pass).status;
+  };
+  EXPECT_EQ(status(alpha), 200);
+  folder.write("tokens", "beta-beta\n");
+  EXPECT_TRUE(eventually([&] { return status(alpha) == 401; }));
+  EXPECT_EQ(status(beta), 200);
+}
+
 TEST_F(Media, AreListedForAuthors) {
   start(true);
   EXPECT_EQ(get("media").status, 401);

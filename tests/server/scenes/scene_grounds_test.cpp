@@ -163,6 +163,22 @@ TEST_F(SceneGroundsTest, OfManyThoseThatWereUsedLastStay) {
   EXPECT_TRUE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone)));
 }
 
+TEST_F(SceneGroundsTest, SavesOfOneSceneDropNoFilesOfOthers) {
+  save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
+  start();
+  const fs::path other = write("cache/other.walk", "");
+  fs::last_write_time(other, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  auto saved = std::make_shared<SceneEntry>(*load());
+  for (std::size_t i = 0; i < 2 * SceneGrounds::max_kept_of_scene; ++i) {
+    saved = std::make_shared<SceneEntry>(*saved);
+    saved->facts.about.metres_per_unit = 1.0f + static_cast<float>(i);
+    library_->revise(id(), saved);
+    EXPECT_EQ(found()->file, nullptr);
+  }
+  EXPECT_EQ(kept().size(), SceneGrounds::max_kept_of_scene + 1);
+  EXPECT_TRUE(fs::exists(other));
+}
+
 TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
   const std::string own = walk::pack(map_of(stairs(), {0, 3, 1.6f}));
   write("scenes/a.walk", own);

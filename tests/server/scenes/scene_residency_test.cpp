@@ -18,9 +18,9 @@ class SceneResidencyTest : public testing::Test {
   explicit SceneResidencyTest(std::uint64_t pool_bytes = 0)
       : residency_({.budget_bytes = 100, .pool_bytes = pool_bytes, .min_residency = 60s}) {}
   Wish want(const std::string& id, std::uint64_t bytes) {
-    return residency_.want(id, bytes, now_, in_use_);
+    return residency_.want(id, bytes, now_, use_of_);
   }
-  std::optional<SceneResidency::Step> next() { return residency_.next(now_, in_use_); }
+  std::optional<SceneResidency::Step> next() { return residency_.next(now_, use_of_); }
   /// It is wanted, loaded and left.
   void visit(const std::string& id, std::uint64_t bytes) {
     ASSERT_EQ(want(id, bytes), Wish::awaited) << id;
@@ -30,9 +30,11 @@ class SceneResidencyTest : public testing::Test {
   }
 
   TimePoint now_{};
-  std::set<std::string> used_;
-  const SceneResidency::InUse in_use_ = [this](const std::string& id) {
-    return used_.contains(id);
+  std::set<std::string> used_;    // by visitors
+  std::set<std::string> leased_;  // to background jobs
+  const SceneResidency::UseOf use_of_ = [this](const std::string& id) {
+    if (used_.contains(id)) return SceneUse::visitors;
+    return leased_.contains(id) ? SceneUse::background : SceneUse::none;
   };
   SceneResidency residency_;
 };
@@ -56,7 +58,7 @@ TEST_F(SceneResidencyTest, FewTreesAreInMemoryAtATime) {
   const SceneNeed tree(1000, true);
   const auto name = [](std::size_t i) { return "tree " + std::to_string(100 + i); };
   for (std::size_t i = 0; i <= most_scenes_in_pages; ++i) {
-    ASSERT_EQ(residency_.want(name(i), tree, now_, in_use_), Wish::awaited) << i;
+    ASSERT_EQ(residency_.want(name(i), tree, now_, use_of_), Wish::awaited) << i;
     const auto step = next();
     ASSERT_TRUE(step) << i;
     if (i < most_scenes_in_pages) {
@@ -68,7 +70,7 @@ TEST_F(SceneResidencyTest, FewTreesAreInMemoryAtATime) {
     now_ += 100s;
   }
   for (std::size_t i = 1; i <= most_scenes_in_pages; ++i) used_.insert(name(i));
-  EXPECT_EQ(residency_.want(name(0), tree, now_, in_use_), Wish::no_room);
+  EXPECT_EQ(residency_.want(name(0), tree, now_, use_of_), Wish::no_room);
 }
 
 TEST_F(SceneResidencyTest, OneWaitsWhileOneIsLoadedAndOthersAreRefused) {
@@ -150,7 +152,7 @@ TEST_F(SceneResidencyTest, RefusesWhatNeverFits) {
   residency_.pin("p", 20);
   EXPECT_EQ(want("b", 81), Wish::too_large) << "pinned scenes never go";
   SceneResidency unbounded({});
-  EXPECT_EQ(unbounded.want("a", 1ull << 50, now_, in_use_), Wish::awaited);
+  EXPECT_EQ(unbounded.want("a", 1ull << 50, now_, use_of_), Wish::awaited);
 }
 
 TEST_F(SceneResidencyTest, PinnedScenesStay) {
@@ -174,12 +176,80 @@ TEST_F(SceneResidencyTest, AFailureLeavesRoomForTheNext) {
   EXPECT_EQ(want("a", 50), Wish::awaited) << "it may be tried again";
 }
 
+TEST_F(SceneResidencyTest, BackgroundJobLetsGoOfASceneForAVisitor) {
+  visit("a", 60);
+  leased_ = {"a"};
+  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_FALSE(next()) << "a scene stays for a minute";
+  now_ += 60s;
+  const auto step = next();
+  ASSERT_TRUE(step);
+  EXPECT_THAT(step->recall, ElementsAre("a"));
+  EXPECT_EQ(step->load, "");
+  EXPECT_TRUE(residency_.resident("a")) << "its memory is not free yet";
+  leased_.clear();
+  const auto later = next();
+  ASSERT_TRUE(later);
+  EXPECT_THAT(later->release, ElementsAre("a"));
+  EXPECT_EQ(later->load, "b");
+}
+
+TEST_F(SceneResidencyTest, UnusedSceneGoesBeforeOneOfABackgroundJob) {
+  visit("a", 50);
+  now_ += 1s;
+  visit("b", 50);
+  leased_ = {"a"};
+  now_ += 60s;
+  residency_.note_use("a", now_);
+  EXPECT_EQ(want("c", 50), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("b"));
+}
+
+TEST_F(SceneResidencyTest, BackgroundJobGetsRoomThatNobodyHasUsedForAMinute) {
+  const auto for_job = [&] { return residency_.next_in_background("f", 60, now_, use_of_); };
+  visit("a", 60);
+  EXPECT_FALSE(for_job());
+  now_ += 59s;
+  residency_.note_use("a", now_);
+  now_ += 59s;
+  EXPECT_FALSE(for_job()) << "a visitor may come back";
+  now_ += 1s;
+  for (auto* const set : {&used_, &leased_}) {
+    *set = {"a"};
+    EXPECT_FALSE(for_job());
+    set->clear();
+  }
+  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_FALSE(for_job()) << "a visitor waits";
+  residency_.failed(next()->load);
+  const auto step = for_job();
+  ASSERT_TRUE(step);
+  EXPECT_EQ(step->load, "f");
+}
+
+TEST_F(SceneResidencyTest, LoadOfABackgroundJobRefusesNobody) {
+  ASSERT_TRUE(residency_.next_in_background("f", 60, now_, use_of_));
+  EXPECT_TRUE(residency_.loads_in_background());
+  for (const char* id : {"a", "b", "c"}) EXPECT_EQ(want(id, 60), Wish::awaited) << id;
+  residency_.failed("f");
+  EXPECT_EQ(next()->load, "a");
+  EXPECT_EQ(want("b", 30), Wish::awaited);
+  EXPECT_EQ(want("c", 30), Wish::busy) << "a visitor's load is under way";
+}
+
+TEST_F(SceneResidencyTest, SceneOfABackgroundJobGoesAtOnceForAVisitor) {
+  ASSERT_TRUE(residency_.next_in_background("f", 60, now_, use_of_));
+  residency_.loaded("f", 60, now_);
+  EXPECT_EQ(want("a", 60), Wish::awaited);
+  EXPECT_THAT(next()->release, ElementsAre("f"));
+}
+
 class SharedPoolTest : public SceneResidencyTest {
  protected:
   SharedPoolTest() : SceneResidencyTest(50) {}
   static SceneNeed pages() { return {1'000'000, true}; }
   void visit_tree(const std::string& id) {
-    ASSERT_EQ(residency_.want(id, pages(), now_, in_use_), Wish::awaited) << id;
+    ASSERT_EQ(residency_.want(id, pages(), now_, use_of_), Wish::awaited) << id;
     const auto step = next();
     ASSERT_TRUE(step && step->load == id) << id;
     residency_.loaded(id, pages(), now_);
@@ -219,14 +289,14 @@ TEST_F(SharedPoolTest, AWholeSceneGoesForThePool) {
   visit("whole", 60);
   now_ += 120s;
   EXPECT_FALSE(residency_.has_room(pages()));
-  EXPECT_EQ(residency_.want("city", pages(), now_, in_use_), Wish::awaited);
+  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Wish::awaited);
   EXPECT_THAT(next()->release, ElementsAre("whole"));
 }
 
 TEST_F(SharedPoolTest, WholeScenesInUseKeepTheTreesOut) {
   visit("whole", 60);
   used_ = {"whole"};
-  EXPECT_EQ(residency_.want("city", pages(), now_, in_use_), Wish::no_room);
+  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Wish::no_room);
 }
 
 }  // namespace

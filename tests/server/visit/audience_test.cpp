@@ -91,6 +91,14 @@ TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
   EXPECT_EQ(told(true), 1) << "that it stops";
   now += 1s;
   EXPECT_EQ(told(true), 1);
+  // It rests and moves in turns, as often as a connection may send.
+  const int before = connection->messages;
+  for (int i = 0; i < 600; ++i) {
+    PoseSample camera;
+    camera.at_rest = i % 2 == 0;
+    audience.presentation().moved(camera, now += 1667us);
+  }
+  EXPECT_LE(connection->messages - before, 32);
 }
 
 TEST_F(AudienceTest, ASlowOneDropsToTheNextIdrAndDisturbsNobody) {

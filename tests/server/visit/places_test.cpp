@@ -207,6 +207,30 @@ TEST_F(CompanyTest, FollowersPointWhereTheLeaderLetsThem) {
   EXPECT_EQ(heard_of(stranger, 1), 0u) << "who follows nobody points at nothing";
 }
 
+TEST_F(CompanyTest, SharedTourBeginsAFewTimesASecondAtMost) {
+  begin(false, false);
+  v1::ClientMessage off, on, follows;
+  off.mutable_present()->set_on(false);
+  on.mutable_present()->set_on(true);
+  follows.mutable_follow()->set_watch(leader->connection->welcome->watch_token());
+  const auto flood = [&](Visitor& visitor, const v1::ClientMessage& again) {
+    for (int i = 0; i < 20; ++i) {
+      say(visitor, off);
+      say(visitor, again);
+    }
+    run_until([&] { return visitor.connection->error.has_value(); });
+    EXPECT_EQ(visitor.connection->error->code(), v1::Error::RATE_LIMITED);
+    EXPECT_FALSE(visitor.connection->error->fatal());
+    EXPECT_FALSE(visitor.connection->closed);
+  };
+  flood(*follower, follows);
+  EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
+  flood(*leader, on);
+  Visitor& later = join();
+  follow(later);
+  EXPECT_EQ(later.connection->lead->state(), v1::Lead::ENDED) << "nobody leads any more";
+}
+
 TEST_F(CompanyTest, NobodyIsToldWhereOthersAreUnlessTheLeaderWantsIt) {
   begin(false, false);
   move(*leader);

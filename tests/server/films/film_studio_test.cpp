@@ -1,0 +1,155 @@
+// Jobs whose scene goes and comes back. The test is the session thread.
+
+#include "server/films/film_studio.h"
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "render_core/base/thread_pool.h"
+#include "tests/render_core/scene/scene_test_support.h"
+
+namespace catgs::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+const std::string view = "[0, 0, -6, 0, 0, 0, 1, 60]";
+
+std::string film_of(int frames) {
+  return fmt::format(R"({{"kind": "film", "size": [64, 48], "views": [{}, {}]}})", view,
+                     frames - 1);
+}
+
+class FilmStudioTest : public testing::Test {
+ protected:
+  FilmStudioTest() {
+    scene.renderer =
+        make_renderer(std::make_shared<GaussianCloud>(random_cloud(300, 0)),
+                      {.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(1)})
+            .renderer;
+    scene.facts.near_z = 0.2f;
+  }
+  void start(std::chrono::milliseconds longest_wait = 10min) {
+    studio.emplace(FilmStudio::Surroundings{
+        io,
+        [this](const std::string&, bool again) {
+          asked_again = asked_again || again;
+          return there ? leased(scene, leases, content) : LeasedScene{.gone = gone};
+        },
+        [] { return false; }, [this](std::string_view owner) { return owner == revoked.load(); },
+        longest_wait});
+  }
+  std::string order(const std::string& json) {
+    auto answer = studio->order("hall", "ada", json, std::make_shared<UploadPlace>());
+    return nlohmann::json::parse(*answer.get().body).at("id");
+  }
+  HttpResponse get(const std::string& path) { return *studio->respond({"/api/films/" + path, {}}); }
+  nlohmann::json report(const std::string& job) { return nlohmann::json::parse(*get(job).body); }
+  void run_until(const std::function<bool()>& holds) {
+    for (int i = 0; i < 20'000 && !holds(); ++i) {
+      io.restart();
+      io.poll();
+      std::this_thread::sleep_for(1ms);
+    }
+    ASSERT_TRUE(holds());
+  }
+  /// A film without end, of which some frames are drawn.
+  std::string begin() {
+    const std::string job = order(film_of(18'000));
+    run_until([&] { return report(job).at("share") > 0.0; });
+    return job;
+  }
+  /// As for a visitor of another scene.
+  void take_the_memory() {
+    there = false;
+    ++leases->recalls;
+    run_until([&] { return leases->held == 0; });
+  }
+  std::string error_of(const std::string& job) {
+    run_until([&] { return report(job).at("state") == "failed"; });
+    return report(job).at("error");
+  }
+
+  SceneEntry scene;
+  const std::shared_ptr<SceneLeases> leases = std::make_shared<SceneLeases>();
+  bool there = true, gone = false, asked_again = false;
+  int content = 0;
+  std::atomic<const char*> revoked{""};
+  boost::asio::io_context io;
+  std::optional<FilmStudio> studio;
+};
+
+TEST_F(FilmStudioTest, JobLetsGoOfItsSceneAndTakesItAgain) {
+  start();
+  const std::string job = order(film_of(4000));
+  run_until([&] { return report(job).at("share") > 0.0; });
+  EXPECT_FALSE(asked_again);
+  take_the_memory();
+  EXPECT_EQ(scene.renderer.use_count(), 1) << "no View of it is left";
+  run_until([&] { return asked_again; });
+  EXPECT_EQ(report(job).at("state"), "drawing");
+  there = true;
+  run_until([&] { return report(job).at("state") == "done"; });
+  EXPECT_EQ(get(job + "/file").content_type, "video/mp4");
+  EXPECT_EQ(leases->held, 0);
+}
+
+TEST_F(FilmStudioTest, JobEndsWithTheReasonWhyItsSceneStaysAway) {
+  start(1ms);
+  std::string job = begin();
+  take_the_memory();
+  EXPECT_THAT(error_of(job), HasSubstr("visitors of other scenes need the memory"));
+  there = true;
+  job = begin();
+  gone = true;
+  take_the_memory();
+  EXPECT_THAT(error_of(job), HasSubstr("not offered any more"));
+}
+
+TEST_F(FilmStudioTest, JobShowsOneContentOfItsScene) {
+  start();
+  const std::string job = begin();
+  take_the_memory();
+  ++content;
+  there = true;
+  EXPECT_THAT(error_of(job), HasSubstr("file has changed"));
+}
+
+TEST_F(FilmStudioTest, JobThatWaitsForItsSceneCanBeCancelled) {
+  start();
+  const std::string job = begin();
+  take_the_memory();
+  EXPECT_EQ(studio->cancel({"/api/films/" + job + "/cancel", {}}).get().status, 200);
+  there = true;
+  const std::string next = order(film_of(2));
+  run_until([&] { return report(next).at("state") == "done"; });
+}
+
+TEST_F(FilmStudioTest, RevokedLinkHasNoResultAndNoJob) {
+  start();
+  const std::string done = order(film_of(2));
+  run_until([&] { return report(done).at("state") == "done"; });
+  EXPECT_EQ(get(done + "/file").status, 200);
+  const std::string drawn = begin();
+  revoked = "ada";
+  EXPECT_EQ(get(done).status, 404);
+  EXPECT_EQ(get(done + "/file").status, 404);
+  EXPECT_TRUE(studio->refuse_cancel({"/api/films/" + drawn + "/cancel", {}}));
+  run_until([&] { return leases->held == 0; });
+  revoked = "";
+  EXPECT_EQ(report(drawn).at("state"), "cancelled");
+}
+
+}  // namespace
+}  // namespace catgs::test
