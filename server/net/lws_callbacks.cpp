@@ -57,7 +57,8 @@ int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
                  : exchange.begin_refused_upload(wsi, *std::move(refusal));
   UploadPlaces& places = large ? service.large_uploads : service.uploads;
   const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  if (auto place = places.take(link)) return exchange.begin_upload(wsi, place, bytes);
+  if (auto place = places.take(link, limited_as(client_address_of(wsi))))
+    return exchange.begin_upload(wsi, place, bytes);
   site_of(wsi).uploads.on_full();
   return exchange.refuse_body(
       wsi, busy_response("503: others are saving at the moment: try again in a second\n"),

@@ -29,8 +29,8 @@ struct Service {
   int callbacks = 0;  // in this round of the service loop
   RateLimit idle_rounds{idle_rounds_per_second, idle_round_burst,
                         Clock::now()};  // rounds without a callback
-  UploadPlaces uploads;
-  UploadPlaces large_uploads{UploadPlaces::large_places, UploadPlaces::large_places_of_a_link};
+  UploadPlaces uploads{UploadPlaces::small};
+  UploadPlaces large_uploads{UploadPlaces::large};
   DiskThreads disk{waker};
 };
 
