@@ -85,6 +85,7 @@ int on_put(lws* wsi, LwsHttpExchange& exchange) {
 /// a body.
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
+  service_of(wsi).gate.requested(wsi);
   if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
   if (lacks_tls(wsi) && !is_get_or_head(wsi))
     return refuse_request(wsi, 400, "this port speaks https");
@@ -108,16 +109,25 @@ int on_request(lws* wsi, HttpSlot& slot) {
   return slot.exchange->begin(wsi, handler, site_address(wsi, host));
 }
 
+/// Ends libwebsockets' loop over waiting connections, see accept_again().
+void count_accepted(Service& service, lws* listener) {
+  constexpr int most_accepted = 8;  // in a round; a handshake takes 0.1 to 1 ms
+  if (++service.accepted < most_accepted) return;
+  lws_rx_flow_control(listener, 0);
+  service.held_ports.push_back(listener);
+}
+
 /// Called before the connection has a lws. Operators and probes get in even when others do not. A
 /// proxy has one address for all its clients.
 int on_accept(lws* listener, int descriptor) {
   const Site& site = site_of(listener);
+  count_accepted(service_of(listener), listener);
   if (!site.accept) return keep_reading;
   std::array<char, 64> peer{};
   lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
   const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
-  const auto why =
-      service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
+  const auto why = service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(),
+                                                     counted, Clock::now());
   if (!why) return keep_reading;
   site.on_refused({.event = "connection_refused", .address = peer.data()},
                   fmt::format("{}: {}", peer.data(), *why));
@@ -135,6 +145,7 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       service_of(wsi).gate.closed(wsi);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      service_of(wsi).gate.requested(wsi);
       return confirm_upgrade(wsi);
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
       note_refused(wsi, 0, "request refused: this is no proxy");
@@ -236,6 +247,12 @@ const lws_protocols service_protocols[] = {
      nullptr, 0},
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
+
+void accept_again(Service& service) {
+  for (lws* listener : service.held_ports) lws_rx_flow_control(listener, 1);
+  service.held_ports.clear();
+  service.accepted = 0;
+}
 
 void pause_where_nothing_happens(Service& service) {
   constexpr std::chrono::milliseconds pause{2};

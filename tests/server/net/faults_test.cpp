@@ -269,6 +269,27 @@ TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
   network_fails = false;
 }
 
+/// libwebsockets accepts all that wait at a time, and as long as others come: visitors' frames
+/// wait.
+TEST(ServerFaults, FewConnectionsAreAcceptedInARound) {
+  ServerConfig config;
+  config.scenes = {"synth:city:2000"};
+  config.port = 0;
+  config.admin_bind = "off";
+  config.threads = 2;
+  Server server(config);
+  std::vector<RawSocket> silent;
+  for (int i = 0; i < 200; ++i) silent.emplace_back(server.port());
+  RawSocket last(server.port());
+  last.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  services = 0;
+  auto ended = std::async(std::launch::async, [&] { server.run(); });
+  const Stopped stopped(server);
+  std::string answer;
+  EXPECT_TRUE(last.receive_until("200", answer)) << answer;
+  EXPECT_GE(services, 200 / 8);
+}
+
 /// How often libwebsockets looks what there is to do.
 int services_in(std::chrono::milliseconds time) {
   const int before = services;

@@ -50,6 +50,7 @@ class HttpConformance : public testing::Test {
     server.emplace([&](ServerConfig& config) {
       config.client_dir = (folder / "web").string();
       config.max_sessions = 64;
+      config.max_sessions_per_address = 150;  // connections follow it (AcceptGate::bounds_for)
     });
   }
 
@@ -300,7 +301,8 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
 
 /// Slow senders, the silent, who does not read, and websockets that do not answer pings: all at
 /// once, because each takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30
-/// (server/net/net_server.cpp), `body_time_us` and `piece_timeout_s` 30 (server/net/lws_http.cpp).
+/// (server/net/net_server.cpp), `grace` 10 (server/net/body_deadline.h) and `piece_timeout_s` 30
+/// (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
   const std::size_t before = open_descriptors();
   {
