@@ -13,7 +13,7 @@ def findings(haproxy, config):
     """One address holds its connections, and another one is still served. The servers may be absent."""
     port = free_port()
     text = re.sub(r"^frontend stats[\s\S]*$", "", config.read_text(), flags=re.M)
-    text = re.sub(r"maxconn (20|4)000", "maxconn 2500", text)  # of the whole, which takes as many descriptors twice
+    text = re.sub(r"maxconn (20|4)000", "maxconn 2500", text)  # each may take two descriptors
     text = re.sub(r"bind :(80|8080)$", f"bind 127.0.0.1:{port}", text, flags=re.M)
     config.write_text(re.sub(r"bind :443", f"bind 127.0.0.1:{free_port()}", text))
     with subprocess.Popen([haproxy, "-db", "-f", str(config)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as proxy:
@@ -34,9 +34,9 @@ def findings(haproxy, config):
                     time.sleep(0.05)
         finally:
             proxy.terminate()
-    # Limits of a rate may allow fewer.
-    return ([] if held <= OF_AN_ADDRESS else [f"one address holds {held} connections"]) + (
-        [] if served and held >= OF_AN_ADDRESS // 2 else [f"{held} connections of one address keep others out, or are too few"])
+    wrong = [] if served else ["one address keeps others out"]
+    # A limit of its rate may allow fewer.
+    return wrong if OF_AN_ADDRESS // 2 <= held <= OF_AN_ADDRESS else [*wrong, f"one address holds {held} connections"]
 
 
 def is_open(connection):

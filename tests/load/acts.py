@@ -50,7 +50,8 @@ def two_authors_save(address: Address, link: str) -> str:
     tag = json.loads(ask(address, link, "GET", TOURS).body)["document"]["etag"]
 
     def save(z: int) -> Answer:
-        tours = {"tours": [{"title": f"of author {z} at {time.time_ns()}", "stops": [{"position": [0, 0, z], "look_at": [0, 0, 9]}]}]}
+        stop = {"position": [0, 0, z], "look_at": [0, 0, 9]}
+        tours = {"tours": [{"title": f"of author {z} at {time.time_ns()}", "stops": [stop]}]}
         return ask(address, link, "PUT", SIDECAR, json.dumps(tours), tag or '"none"')
 
     with concurrent.futures.ThreadPoolExecutor(2) as authors:
