@@ -109,25 +109,31 @@ int on_request(lws* wsi, HttpSlot& slot) {
   return slot.exchange->begin(wsi, handler, site_address(wsi, host));
 }
 
-/// Ends libwebsockets' loop over waiting connections, see accept_again().
-void count_accepted(Service& service, lws* listener) {
-  constexpr int most_accepted = 8;  // in a round; a handshake takes 0.1 to 1 ms
-  if (++service.accepted < most_accepted) return;
+// In a round of the service loop. A handshake takes 0.1 to 1 ms.
+constexpr int most_accepted = 8;
+constexpr int most_failed = 64;
+
+/// Ends libwebsockets' loop over waiting connections, see accept_again(). A handshake that fails
+/// opens the port again. True: too many have, and only a refusal ends the loop.
+bool accepts_too_many(Service& service, lws* listener) {
+  if (++service.accepted < most_accepted) return false;
   lws_rx_flow_control(listener, 0);
   service.held_ports.push_back(listener);
+  return service.accepted > most_failed;
 }
 
 /// Called before the connection has a lws. Operators and probes get in even when others do not. A
 /// proxy has one address for all its clients.
 int on_accept(lws* listener, int descriptor) {
   const Site& site = site_of(listener);
-  count_accepted(service_of(listener), listener);
+  const bool too_many = accepts_too_many(service_of(listener), listener);
   if (!site.accept) return keep_reading;
   std::array<char, 64> peer{};
   lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
   const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
-  const auto why = service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(),
-                                                     counted, Clock::now());
+  auto why = service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted,
+                                               Clock::now());
+  if (too_many && !why) why = "connection refused: many handshakes fail at the moment";
   if (!why) return keep_reading;
   site.on_refused({.event = "connection_refused", .address = peer.data()},
                   fmt::format("{}: {}", peer.data(), *why));
