@@ -203,6 +203,7 @@ NetOptions Server::State::net_options() {
   options.embed_origins = config.embed_origins;
   options.media_origins = config.media_origins;
   options.trusted_proxies = config.trusted_proxies;
+  options.sessions_of_an_address = config.max_sessions_per_address;
   options.tls_certificate = config.tls_cert;
   options.tls_key = config.tls_key;
   if (config.admin_bind != "off") {

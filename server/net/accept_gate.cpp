@@ -51,31 +51,63 @@ void AcceptGate::require_room() {
       "ulimit -n 1024, or LimitNOFILE=1024 in the unit");
 }
 
+AcceptGate::Bounds AcceptGate::bounds_for(int sessions) {
+  // A page opens seven connections at most at a time, and reloads overlap with what they replace.
+  constexpr int at_least = 256, of_a_session = 12;
+  // A burst of `open` comes again after this time.
+  constexpr double seconds_to_refill = 8.0;
+  const int open = at_least + of_a_session * sessions;
+  return {open, open / 4, open / seconds_to_refill};
+}
+
+AcceptGate::Address& AcceptGate::known(const std::string& address, TimePoint now) {
+  if (addresses_.size() >= most_addresses && !addresses_.contains(address))
+    std::erase_if(addresses_, [](const auto& one) { return one.second.open == 0; });
+  return addresses_
+      .try_emplace(address, Address{.arrivals = {bounds_.per_second,
+                                                 static_cast<double>(bounds_.open), now}})
+      .first->second;
+}
+
 std::optional<std::string> AcceptGate::refusal(int descriptor, int limit,
-                                               const std::string& address) {
+                                               const std::string& address, TimePoint now) {
   const int usable = limit - reserved_descriptors;
+  let_in_.clear();
   if (descriptor >= usable)
     return fmt::format("connection refused: {} descriptors are taken (LimitNOFILE, ulimit -n)",
                        descriptor);
-  const auto open = open_.find(address);
-  if (open != open_.end() && open->second >= usable / 2)
-    return fmt::format("connection refused: {} are open already", open->second);
+  if (address.empty()) return std::nullopt;
+  Address& from = known(address, now);
+  if (from.open >= std::min(bounds_.open, usable / 2))
+    return fmt::format("connection refused: {} are open already", from.open);
+  if (from.silent >= bounds_.silent)
+    return fmt::format("connection refused: {} have sent no request yet", from.silent);
+  if (!from.arrivals.take(now))
+    return fmt::format("connection refused: more than {:.0f} a second", bounds_.per_second);
   let_in_ = address;
   return std::nullopt;
 }
 
 void AcceptGate::opened(const void* connection) {
   if (let_in_.empty()) return;
-  ++open_[let_in_];
-  addresses_[connection] = std::exchange(let_in_, {});
+  Address& from = addresses_.at(let_in_);
+  ++from.open;
+  ++from.silent;
+  connections_[connection] = {std::exchange(let_in_, {})};
+}
+
+void AcceptGate::requested(const void* connection) {
+  const auto found = connections_.find(connection);
+  if (found != connections_.end() && std::exchange(found->second.silent, false))
+    --addresses_.at(found->second.address).silent;
 }
 
 void AcceptGate::closed(const void* connection) {
-  const auto address = addresses_.find(connection);
-  if (address == addresses_.end()) return;
-  const auto open = open_.find(address->second);
-  if (--open->second == 0) open_.erase(open);
-  addresses_.erase(address);
+  requested(connection);
+  const auto found = connections_.find(connection);
+  if (found == connections_.end()) return;
+  --addresses_.at(found->second.address).open;
+  connections_.erase(found);
 }
 
 }  // namespace catgs

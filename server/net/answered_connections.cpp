@@ -1,25 +1,49 @@
 #include "server/net/answered_connections.h"
 
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include <poll.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
 namespace catgs {
+
+AnsweredConnections::AnsweredConnections() : epoll_(::epoll_create1(EPOLL_CLOEXEC)) {
+  if (epoll_ < 0) throw std::system_error(errno, std::generic_category(), "epoll_create1");
+}
+
+AnsweredConnections::~AnsweredConnections() { ::close(epoll_); }
 
 void AnsweredConnections::add(lws* wsi) {
   lws_rx_flow_control(wsi, 0);
-  connections_.push_back(wsi);
+  epoll_event wanted{EPOLLOUT, {.ptr = wsi}};
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, lws_get_socket_fd(wsi), &wanted) != 0)
+    throw std::system_error(errno, std::generic_category(), "epoll_ctl");
+  connections_.insert(wsi);
 }
 
-void AnsweredConnections::remove(lws* wsi) { std::erase(connections_, wsi); }
+void AnsweredConnections::remove(lws* wsi) {
+  if (connections_.erase(wsi) > 0)
+    ::epoll_ctl(epoll_, EPOLL_CTL_DEL, lws_get_socket_fd(wsi), nullptr);
+}
 
 void AnsweredConnections::serve(lws_context* context) {
-  if (connections_.empty()) return;  // the usual case costs no system call
-  polled_.clear();
-  for (lws* wsi : connections_) polled_.push_back({lws_get_socket_fd(wsi), POLLOUT, 0});
-  if (::poll(polled_.data(), polled_.size(), 0) <= 0) return;
-  const std::vector<lws*> connections = connections_;  // those that end are removed meanwhile
-  for (std::size_t i = 0; i < connections.size(); ++i) {
-    if (polled_[i].revents == 0) continue;
-    lws_rx_flow_control(connections[i], 1);
-    const bool ended = lws_service_fd(context, &polled_[i]) != 0;
-    if (!ended) lws_rx_flow_control(connections[i], 0);
+  constexpr std::size_t most_at_a_time = 32;  // up to 64 KiB each: frames wait for them
+  if (connections_.empty()) return;           // the usual case costs no system call
+  std::array<epoll_event, most_at_a_time> ready;
+  const int count = ::epoll_wait(epoll_, ready.data(), most_at_a_time, 0);
+  for (int i = 0; i < count; ++i) {
+    lws* const wsi = static_cast<lws*>(ready[static_cast<std::size_t>(i)].data.ptr);
+    pollfd polled{lws_get_socket_fd(wsi), POLLOUT,
+                  static_cast<short>(ready[static_cast<std::size_t>(i)].events)};
+    lws_rx_flow_control(wsi, 1);
+    const bool ended = lws_service_fd(context, &polled) != 0;
+    if (ended)
+      remove(wsi);  // it may still wait for the client's end
+    else
+      lws_rx_flow_control(wsi, 0);
   }
 }
 

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <vector>
+#include <unordered_set>
 
 #include <libwebsockets.h>
-#include <poll.h>
 
 namespace catgs {
 
@@ -13,14 +12,20 @@ namespace catgs {
 /// so serve() triggers its writes. Network thread only.
 class AnsweredConnections {
  public:
+  AnsweredConnections();
+  ~AnsweredConnections();
+  AnsweredConnections(const AnsweredConnections&) = delete;
+  AnsweredConnections& operator=(const AnsweredConnections&) = delete;
+
   void add(lws* wsi);
   void remove(lws* wsi);
-  /// Writes to the connections whose sockets are writable. Call it after each lws_service().
+  /// Writes to some of the connections whose sockets are writable, in turn. Call it after each
+  /// lws_service(). Thousands that wait cost nothing: the kernel keeps the list of the ready ones.
   void serve(lws_context* context);
 
  private:
-  std::vector<lws*> connections_;
-  std::vector<pollfd> polled_;
+  const int epoll_;
+  std::unordered_set<lws*> connections_;
 };
 
 }  // namespace catgs

@@ -57,7 +57,8 @@ int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
                  : exchange.begin_refused_upload(wsi, *std::move(refusal));
   UploadPlaces& places = large ? service.large_uploads : service.uploads;
   const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  if (auto place = places.take(link)) return exchange.begin_upload(wsi, place, bytes);
+  if (auto place = places.take(link, limited_as(client_address_of(wsi))))
+    return exchange.begin_upload(wsi, place, bytes);
   site_of(wsi).uploads.on_full();
   return exchange.refuse_body(
       wsi, busy_response("503: others are saving at the moment: try again in a second\n"),
@@ -84,6 +85,7 @@ int on_put(lws* wsi, LwsHttpExchange& exchange) {
 /// a body.
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
+  service_of(wsi).gate.requested(wsi);
   if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
   if (lacks_tls(wsi) && !is_get_or_head(wsi))
     return refuse_request(wsi, 400, "this port speaks https");
@@ -107,16 +109,31 @@ int on_request(lws* wsi, HttpSlot& slot) {
   return slot.exchange->begin(wsi, handler, site_address(wsi, host));
 }
 
+// In a round of the service loop. A handshake takes 0.1 to 1 ms.
+constexpr int most_accepted = 8;
+constexpr int most_failed = 64;
+
+/// Ends libwebsockets' loop over waiting connections, see accept_again(). A handshake that fails
+/// opens the port again. True: too many have, and only a refusal ends the loop.
+bool accepts_too_many(Service& service, lws* listener) {
+  if (++service.accepted < most_accepted) return false;
+  lws_rx_flow_control(listener, 0);
+  service.held_ports.push_back(listener);
+  return service.accepted > most_failed;
+}
+
 /// Called before the connection has a lws. Operators and probes get in even when others do not. A
 /// proxy has one address for all its clients.
 int on_accept(lws* listener, int descriptor) {
   const Site& site = site_of(listener);
+  const bool too_many = accepts_too_many(service_of(listener), listener);
   if (!site.accept) return keep_reading;
   std::array<char, 64> peer{};
   lws_get_peer_simple_fd(descriptor, peer.data(), peer.size());
   const std::string counted = site.proxies.is_proxy(peer.data()) ? "" : limited_as(peer.data());
-  const auto why =
-      service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted);
+  auto why = service_of(listener).gate.refusal(descriptor, AcceptGate::descriptor_limit(), counted,
+                                               Clock::now());
+  if (too_many && !why) why = "connection refused: many handshakes fail at the moment";
   if (!why) return keep_reading;
   site.on_refused({.event = "connection_refused", .address = peer.data()},
                   fmt::format("{}: {}", peer.data(), *why));
@@ -134,6 +151,7 @@ int on_http(lws* wsi, lws_callback_reasons reason, HttpSlot* slot, void* in, std
       service_of(wsi).gate.closed(wsi);
       return 0;
     case LWS_CALLBACK_HTTP_CONFIRM_UPGRADE:
+      service_of(wsi).gate.requested(wsi);
       return confirm_upgrade(wsi);
     case LWS_CALLBACK_RAW_ADOPT:  // what libwebsockets makes of a CONNECT
       note_refused(wsi, 0, "request refused: this is no proxy");
@@ -235,6 +253,12 @@ const lws_protocols service_protocols[] = {
      nullptr, 0},
     {nullptr, nullptr, 0, 0, 0, nullptr, 0},
 };
+
+void accept_again(Service& service) {
+  for (lws* listener : service.held_ports) lws_rx_flow_control(listener, 1);
+  service.held_ports.clear();
+  service.accepted = 0;
+}
 
 void pause_where_nothing_happens(Service& service) {
   constexpr std::chrono::milliseconds pause{2};

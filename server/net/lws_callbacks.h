@@ -22,17 +22,26 @@ constexpr double idle_round_burst = 3'000.0;
 
 /// The state that callbacks need besides their site. The context's user pointer points to it.
 struct Service {
+  explicit Service(const AcceptGate::Bounds& bounds) : gate(bounds) {}
+
   std::shared_ptr<LwsWaker> waker = std::make_shared<LwsWaker>();
   std::vector<std::byte> scratch;  // outgoing bytes of the packet being written
   AcceptGate gate;
+  int accepted = 0;                // connections, in this round of the service loop
+  std::vector<lws*> held_ports{};  // accept no more in this round
   AnsweredConnections answered;
   int callbacks = 0;  // in this round of the service loop
   RateLimit idle_rounds{idle_rounds_per_second, idle_round_burst,
                         Clock::now()};  // rounds without a callback
-  UploadPlaces uploads;
-  UploadPlaces large_uploads{UploadPlaces::large_places, UploadPlaces::large_places_of_a_link};
+  UploadPlaces uploads{UploadPlaces::small};
+  UploadPlaces large_uploads{UploadPlaces::large};
   DiskThreads disk{waker};
 };
+
+/// Call it between rounds of the service loop. libwebsockets 4.1.6 accepts connections for as long
+/// as others come, which may be forever: TLS costs more than connecting does. So each round accepts
+/// a few, and visitors' frames go out in between.
+void accept_again(Service& service);
 
 /// Call it between rounds of the service loop. libwebsockets 4.1.6 does not block while a socket
 /// has input that it does not read, such as a websocket that it is closing. Such rounds make no

@@ -21,10 +21,6 @@ namespace {
 constexpr std::size_t chunk_bytes = 64 * 1024;
 constexpr int answer_timeout_s = 30;  // until an answer is ready
 constexpr int piece_timeout_s = 30;   // until the client has taken a piece of an answer
-// The limit for a whole body: a time, and more for each byte of those that are long. libwebsockets'
-// own timeout restarts with each piece.
-constexpr lws_usec_t body_time_us = 30 * LWS_US_PER_SEC;
-constexpr std::size_t slowest_bytes_per_s = 128 * 1024;
 constexpr std::size_t max_dropped_bytes = 16 << 20;
 constexpr lws_usec_t answer_poll_us = 10'000;  // saves are rare
 
@@ -176,13 +172,19 @@ int LwsHttpExchange::refuse_body(lws* wsi, HttpResponse response, std::vector<st
 }
 
 void LwsHttpExchange::await_body(lws* wsi, std::size_t bytes) {
-  body_due_ = true;
-  const auto more_s = static_cast<lws_usec_t>(bytes / slowest_bytes_per_s);
-  lws_set_timer_usecs(wsi, body_time_us + more_s * LWS_US_PER_SEC);
+  body_due_.emplace(bytes, Clock::now());
+  set_body_timer(wsi);
+}
+
+/// libwebsockets' own timeout restarts with each piece of a body.
+void LwsHttpExchange::set_body_timer(lws* wsi) {
+  const auto left = body_due_->at() - Clock::now();
+  lws_set_timer_usecs(wsi, std::chrono::ceil<std::chrono::microseconds>(left).count());
 }
 
 int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
   if (has_gone(wsi)) return -1;
+  if (body_due_) body_due_->arrived(bytes.size(), Clock::now());
   if (body_due_ && place_) {
     if (body_.size() + bytes.size() > announced_bytes_) return -1;
     body_.append(bytes);
@@ -194,7 +196,7 @@ int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
 
 int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
   if (!body_due_ || answered_) return -1;
-  body_due_ = false;
+  body_due_.reset();
   if (refusal_) {
     serve(wsi);
     return answer(wsi, *std::move(refusal_));
@@ -209,7 +211,8 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
 }
 
 int LwsHttpExchange::on_timer(lws* wsi) {
-  if (body_due_) return -1;
+  if (body_due_ && body_due_->at() <= Clock::now()) return -1;
+  if (body_due_) set_body_timer(wsi);
   if (!answer_.valid()) return 0;
   if (!is_ready(answer_)) {
     if (has_gone(wsi)) return -1;

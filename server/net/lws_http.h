@@ -11,6 +11,7 @@
 #include <libwebsockets.h>
 
 #include "server/net/answered_connections.h"
+#include "server/net/body_deadline.h"
 #include "server/net/disk_threads.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
@@ -60,6 +61,7 @@ class LwsHttpExchange {
   };
 
   void await_body(lws* wsi, std::size_t bytes = 0);
+  void set_body_timer(lws* wsi);
   int answer_now(lws* wsi);
   int answer(lws* wsi, HttpResponse response);
   void serve(lws* wsi);
@@ -93,7 +95,7 @@ class LwsHttpExchange {
   // The timer ends a body that is due, or looks for the answer. LWS_SET_TIMER_USEC_CANCEL does not
   // cancel it: lws_set_timer_usecs() of 4.1.6 adds it to the time of day like any other value, so
   // the timer fires at once.
-  bool body_due_ = false;
+  std::optional<BodyDeadline> body_due_;
   std::future<HttpResponse> answer_;
 };
 

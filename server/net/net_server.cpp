@@ -77,6 +77,9 @@ Names names_of(const Endpoint& endpoint, bool asks_for_tokens) {
 }  // namespace
 
 struct NetServer::State {
+  explicit State(int sessions_of_an_address)
+      : service(AcceptGate::bounds_for(sessions_of_an_address)) {}
+
   Site site;
   Site admin_site;
   Service service;
@@ -125,7 +128,8 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   return lws_get_vhost_listen_port(made);
 }
 
-NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>()) {
+NetServer::NetServer(NetOptions options)
+    : state_(std::make_unique<State>(options.sessions_of_an_address)) {
   // A write to a closed peer is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
   lws_set_log_level(log_levels, log_errors);
@@ -192,6 +196,7 @@ void NetServer::start() {
         s.on_failed();
         break;
       }
+      accept_again(s.service);
       s.service.answered.serve(s.context);
       pause_where_nothing_happens(s.service);
     }

@@ -29,6 +29,7 @@ struct NetOptions {
   std::vector<std::string> embed_origins;
   std::vector<std::string> media_origins;
   std::vector<std::string> trusted_proxies;  // networks, see TrustedProxies
+  int sessions_of_an_address = 64;           // see AcceptGate
   /// Reports each request refused before admission: whose it was, and why. Errors that
   /// libwebsockets itself reports name no client. Called on the network thread.
   std::function<void(const LogFacts& facts, const std::string& text)> on_refused =

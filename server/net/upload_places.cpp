@@ -4,14 +4,18 @@
 
 namespace catgs {
 
-std::shared_ptr<UploadPlace> UploadPlaces::take(const std::string& link) {
+std::shared_ptr<UploadPlace> UploadPlaces::take(const std::string& link,
+                                                const std::string& address) {
   const std::lock_guard lock(mutex_);
   std::erase_if(taken_, [](const Taken& one) { return one.place.expired(); });
-  const auto of_this_link =
-      static_cast<std::size_t>(std::ranges::count(taken_, link, &Taken::link));
-  if (taken_.size() >= most_ || of_this_link >= most_of_a_link_) return nullptr;
+  const auto taken_by = [&](const std::string& sender, std::string Taken::*member) {
+    return static_cast<std::size_t>(std::ranges::count(taken_, sender, member));
+  };
+  if (taken_.size() >= bounds_.all || taken_by(link, &Taken::link) >= bounds_.of_a_link ||
+      taken_by(address, &Taken::address) >= bounds_.of_an_address)
+    return nullptr;
   auto place = std::make_shared<UploadPlace>();
-  taken_.push_back({link, place});
+  taken_.push_back({link, address, place});
   return place;
 }
 

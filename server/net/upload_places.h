@@ -23,27 +23,28 @@ class UploadPlace {
 /// Bounds the uploads in memory. A place is free again when its last holder is gone. Thread-safe.
 class UploadPlaces {
  public:
-  static constexpr std::size_t places = 4;
-  static constexpr std::size_t places_of_a_link = 2;  // so that one link cannot block the others
-  // For bodies of more than max_upload_bytes.
-  static constexpr std::size_t large_places = 2;
-  static constexpr std::size_t large_places_of_a_link = 1;
+  struct Bounds {
+    std::size_t all;
+    std::size_t of_a_link;  // so that one link or one address cannot block the others
+    std::size_t of_an_address;
+  };
+  static constexpr Bounds small{4, 2, 3};
+  static constexpr Bounds large{2, 1, 1};  // for bodies of more than max_upload_bytes
 
-  explicit UploadPlaces(std::size_t most = places, std::size_t most_of_a_link = places_of_a_link)
-      : most_(most), most_of_a_link_(most_of_a_link) {}
+  explicit UploadPlaces(const Bounds& bounds) : bounds_(bounds) {}
 
   /// Returns null if no place is free. `link` is the sender's Authorization header.
-  std::shared_ptr<UploadPlace> take(const std::string& link);
+  std::shared_ptr<UploadPlace> take(const std::string& link, const std::string& address);
   [[nodiscard]] std::size_t taken() const;
 
  private:
   struct Taken {
     std::string link;
+    std::string address;
     std::weak_ptr<const UploadPlace> place;
   };
 
-  const std::size_t most_;
-  const std::size_t most_of_a_link_;
+  const Bounds bounds_;
   mutable std::mutex mutex_;
   std::vector<Taken> taken_;  // may hold freed places; take() removes them
 };

@@ -4,7 +4,7 @@
   operations.py alerts                  every alert has a section in ALERTS.md, and a test in which it fires
   operations.py prometheus              rules and configurations (promtool), and when alerts fire
   operations.py grafana                 the dashboard's panels, and that what it needs is provisioned
-  operations.py haproxy                 both configurations (haproxy -c)
+  operations.py haproxy                 both configurations (haproxy -c), and what they give to one address
   operations.py systemd                 the unit and its exposure (systemd-analyze)
   operations.py kubernetes              renders base and overlays (kubectl kustomize) and asserts on them
   operations.py compose                 the compose file: what every service has to have
@@ -30,6 +30,7 @@ import time
 import urllib.request
 
 import dashboard_check
+import haproxy_crowd
 
 SOURCE_DIR = pathlib.Path(__file__).resolve().parents[2]
 DEPLOY = SOURCE_DIR / "deploy"
@@ -147,8 +148,10 @@ def check_haproxy(_):
         pathlib.Path(folder, "key").unlink()
         config = pathlib.Path(folder, "haproxy.cfg")
         config.write_text((DEPLOY / "haproxy/haproxy.cfg").read_text().replace("/etc/haproxy/certs/", str(certificate)))
-        findings += run(haproxy, "-c", "-f", config)
-    findings += run(haproxy, "-c", "-f", DOCKER / "haproxy.cfg")
+        for name, text in (("deploy", config.read_text()), ("docker", (DOCKER / "haproxy.cfg").read_text())):
+            config.write_text(text)
+            findings += run(haproxy, "-c", "-f", config)
+            findings += [f"{name}: {finding}" for finding in haproxy_crowd.findings(haproxy, config)]
     return findings
 
 
@@ -312,9 +315,7 @@ def check_notices(_):
 
 @contextlib.contextmanager
 def running_server(program):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = haproxy_crowd.free_port()
     server = subprocess.Popen([program, "--scene", "synth:city:1000", "--port", "0", "--admin-bind", f"127.0.0.1:{port}",
                                "--renderer", "cpu", "--encoder", "jpeg", "--log-level", "error"])
     try:

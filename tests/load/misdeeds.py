@@ -15,9 +15,11 @@ REQUESTS, SESSIONS, MESSAGES = ("catgs_requests_refused_total", "catgs_sessions_
 TEXT, FRAGMENT, BINARY, CLOSE, PING, PONG = 0x81, 0x02, 0x82, 0x88, 0x89, 0x8a  # first bytes of frames, RFC 6455
 BAD_MESSAGE, UNAUTHORIZED, UNKNOWN_SCENE, RATE_LIMITED = 1, 2, 3, 7  # of proto/catgs.proto
 NOTHING = rb"\Z"
+NOTHING_OR_FULL = rb"\Z|HTTP/1\.1 503 "  # of an upload, by whether others hold all places
 FLOOD_FRAMES = 400_000  # of 6 bytes: 2.3 MiB, where 1.8 may come within a second
 SCRIPT = "/the/page's/script.js"  # whose name has a digest
 SIDECAR = "/api/scenes/hall/sidecar"  # of a scene that authors save, where there are authors
+FILM = "/api/scenes/hall/films"
 SAVES, SAVED_BYTES = 50, 958_000
 HIDDEN = "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"  # where the body of another request is
 
@@ -32,6 +34,8 @@ class Misdeed(NamedTuple):
     reads: bool = True  # otherwise it has room for little, takes nothing and goes on to send bytes
     closes: bool = False  # the same, but all that was sent arrives
     times: int = 1  # on one connection after the other
+    drips: bool = False  # sends a byte more at each look
+    sips: int = 0  # takes so many bytes at each look; 0: all
 
 
 def request(method: str, path: str = "/", headers: str = "", body: str = "", host: str = "localhost") -> bytes:
@@ -91,6 +95,7 @@ def flood(name: str, first: int) -> Misdeed:
                   RATE_LIMITED, bad=False)
 
 
+BYE = struct.pack(">H", 1000) + b"bye"
 NO_HTTP = rb"HTTP/1\.0 403 "  # libwebsockets' own answer, which nothing counts
 ONE_ANSWER = rb"HTTP/1\.1 404 (?:(?!HTTP/1\.).)*\Z"  # connection: close, whatever is behind the request
 NO_CLIENT_MESSAGE = "message: not a ClientMessage of catgs.v1"
@@ -106,7 +111,10 @@ MISDEEDS = [
     refused("sidecar of a foreign Origin", request("PUT", SIDECAR, "Content-Length: 2\r\nOrigin: null\r\n", "{}"), 403,
             "upload refused: origin null is not allowed at localhost (--allow-origin)"),
     refused("sidecar of 99 MB", request("PUT", SIDECAR, "Content-Length: 99999999\r\n", "{"), 413,
-            "upload refused: 413: a Content-Length of 1 to 1048576 is needed"),
+            "upload refused: 413: send at most 1048576 bytes, not 99999999"),
+    refused("save to an empty segment", request("PUT", "/api/scenes//sidecar", "Content-Length: 2\r\n", "{}"), 405,
+            "upload refused: 405: only sidecars and media of scenes, and orders of films, are taken here"),
+    Misdeed("empty and dot segments", request("GET", "/api//scenes/./%2f/tours"), rb"HTTP/1\.1 404 "),
     refused("GET with a body", request("GET", headers="Content-Length: 5\r\n", body="hello"), 413,
             "request refused: 413: a GET needs no body"),
     refused("chunks", request("GET", headers="Transfer-Encoding: chunked\r\n", body="0\r\n\r\n"), 411,
@@ -121,6 +129,7 @@ MISDEEDS = [
             ONE_ANSWER),
     Misdeed("chunks before a space", request("GET", "/nowhere", "Transfer-Encoding : chunked\r\n", HIDDEN), ONE_ANSWER),
     Misdeed("unread answer", request("GET", SCRIPT, body="x"), NOTHING, reads=False),
+    Misdeed("answer in sips", request("GET", SCRIPT), rb"HTTP/1\.1 200 ", sips=512),
     Misdeed("path that climbs", request("GET", "/../../etc/passwd"), rb"HTTP/1\.1 404 "),
     Misdeed("encoded path that climbs", request("GET", "/%2e%2e%2f%2e%2e%2fetc%2fpasswd"), rb"HTTP/1\.1 404 "),
     Misdeed("unknown method", request("NONSENSE"), NO_HTTP),
@@ -170,18 +179,22 @@ def by_access(link: str) -> list[Misdeed]:
         # A new session: the token does no harm.
         Misdeed("unsigned resume token, Bye", upgrade(frame(BINARY, hello(field(8, field(1, "nobody.signed.this")),
                                                                           link=link)) + frame(BINARY, field(9, b""))),
-                rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, struct.pack(">H", 1000) + b"bye", b""))),
+                rb"HTTP/1\.1 101 .*" + re.escape(frame(CLOSE, BYE, b""))),
     ]
 
 
 def by_authors(link: str) -> list[Misdeed]:
-    """Large saves, and many in quick succession whose answers nobody waits for."""
+    """Large saves, many in quick succession whose answers nobody waits for, and uploads that hardly move."""
     token = f"Authorization: Bearer {link}\r\n"
     sidecar = '{"start_pose": {"position": [0, 0, 1], "look_at": [0, 0, 9]}}'.ljust(SAVED_BYTES)
     save, stale = put(token, sidecar), put(f'{token}If-Match: "stale"\r\n', sidecar)
     return [Misdeed("save", save, rb"HTTP/1\.1 200 "), Misdeed("stale save", stale, rb"HTTP/1\.1 412 "),
             Misdeed("saves without end", save, NOTHING, closes=True, times=SAVES),
-            Misdeed("stale saves without end", stale, NOTHING, closes=True, times=SAVES)]
+            Misdeed("stale saves without end", stale, NOTHING, closes=True, times=SAVES),
+            Misdeed("save in drips", request("PUT", SIDECAR, f"{token}Content-Length: {SAVED_BYTES}\r\n"),
+                    NOTHING_OR_FULL, drips=True),
+            Misdeed("film in drips", request("PUT", "/api/scenes/hall/media/a.mp4",
+                                             f"{token}Content-Length: 60000000\r\n"), NOTHING_OR_FULL, drips=True)]
 
 
 def all_misdeeds(link: str = "") -> list[Misdeed]:

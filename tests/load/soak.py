@@ -44,6 +44,7 @@ import urllib.error
 import urllib.request
 
 import soak_report
+from acts import all_acts
 from misdeeds import all_misdeeds
 from strangers import Strangers
 
@@ -326,7 +327,7 @@ def soak(arguments: argparse.Namespace) -> bool:
         process = Process(server.pid if server else arguments.attach, admin)
         samples_file = arguments.out / "samples.jsonl"
         first = begin(samples_file, process, log)
-        strangers = Strangers(url, misdeeds_of(samples_file), all_misdeeds(link))
+        strangers = Strangers(url, misdeeds_of(samples_file), all_misdeeds(link), acts=all_acts(link))
         sampler = Sampler(process, samples_file)
         sampler.start()
         try:

@@ -11,6 +11,7 @@ import tempfile
 import threading
 import unittest
 
+import acts
 import misdeeds
 import soak
 import soak_report
@@ -172,12 +173,26 @@ class Door(socketserver.StreamRequestHandler):
             self.wfile.write(b"HTTP/1.1 403 Forbidden\r\n\r\n")
 
 
+class Drip(socketserver.StreamRequestHandler):
+    """Hangs up when three bytes more have come."""
+
+    def handle(self):
+        self.rfile.readline()
+        self.rfile.read(3)
+
+
+class LongAnswer(socketserver.StreamRequestHandler):
+    def handle(self):
+        self.rfile.readline()
+        self.wfile.write(b"l" * 1200)
+
+
 class StrangersTest(unittest.TestCase):
     """One round each."""
 
-    def go_round(self, path, sends, answer, patience_s=60.0):
-        deed = misdeeds.Misdeed("deed", sends, answer, "a line", (misdeeds.REQUESTS,))
-        with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Door) as server:
+    def go_round(self, path, sends, answer, patience_s=60.0, door=Door, **manners):
+        deed = misdeeds.Misdeed("deed", sends, answer, "a line", (misdeeds.REQUESTS,), **manners)
+        with socketserver.ThreadingTCPServer(("127.0.0.1", 0), door) as server:
             threading.Thread(target=server.serve_forever).start()
             crowd = strangers.Strangers(f"ws://127.0.0.1:{server.server_address[1]}", path,
                                         [deed, deed._replace(name="other")], patience_s)
@@ -209,9 +224,33 @@ class StrangersTest(unittest.TestCase):
             crowd = self.go_round(pathlib.Path(folder) / "misdeeds.txt", b"GET /", misdeeds.NOTHING, 0.0)
             self.assertEqual(crowd.errors(), ["stranger, deed: was not hung up after 0 s: b''"])
 
+    def test_who_drips_sends_until_they_are_hung_up(self):
+        with tempfile.TemporaryDirectory() as folder:
+            crowd = self.go_round(pathlib.Path(folder) / "misdeeds.txt", b"PUT /\r\n", misdeeds.NOTHING, door=Drip,
+                                  drips=True)
+            self.assertEqual(crowd.errors(), [])
+
+    def test_who_sips_takes_all_of_it_in_the_end(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for length, errors in ((1200, 0), (1201, 1)):
+                crowd = self.go_round(pathlib.Path(folder) / "misdeeds.txt", b"GET /\r\n", rb"l{%d}\Z" % length,
+                                      door=LongAnswer, sips=512)
+                self.assertEqual(len(crowd.errors()), errors)
+
+    def test_acts_say_what_was_wrong(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for says, errors in (("", []), ("is wrong", ["stranger, act: is wrong"])):
+                crowd = strangers.Strangers("ws://127.0.0.1:1", pathlib.Path(folder) / "misdeeds.txt", [],
+                                            acts=[acts.Act("act", lambda _, says=says: says)])
+                crowd.stopped.set()
+                with crowd:
+                    pass
+                self.assertEqual(crowd.errors(), errors)
+            self.assertEqual(crowd.done(), {"act": 2})
+
     def test_misdeeds_have_names_of_their_own(self):
         for link in ("", "a link"):
-            names = [misdeed.name for misdeed in misdeeds.all_misdeeds(link)]
+            names = [misdeed.name for misdeed in [*misdeeds.all_misdeeds(link), *acts.all_acts(link)]]
             self.assertEqual(len(set(names)), len(names))
 
     def test_saves_without_end_are_an_authors(self):

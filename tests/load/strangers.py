@@ -7,6 +7,7 @@ leave behind: each counter and the log are compared with what was done.
 import collections
 import concurrent.futures
 import dataclasses
+import http.client
 import itertools
 import pathlib
 import re
@@ -18,6 +19,7 @@ import urllib.parse
 import urllib.request
 from typing import Callable
 
+from acts import Act
 from misdeeds import SCRIPT, Misdeed
 
 PACE_S = 0.4  # the log takes ten lines a second about refusals: refusals_per_second in server/base/log.cpp
@@ -38,9 +40,13 @@ class Stranger:
     def hung_up(self) -> bool:
         """Takes what has come."""
         try:
-            if not self.misdeed.reads:
+            if self.misdeed.drips or not self.misdeed.reads:
                 self.connection.send(b"x")
+            if not self.misdeed.reads:
                 return False
+            if self.misdeed.sips:
+                self.came += (sip := self.connection.recv(self.misdeed.sips))
+                return not sip
             while chunk := self.connection.recv(1 << 16):
                 self.came += chunk
         except BlockingIOError:
@@ -57,11 +63,12 @@ class Stranger:
 class Strangers:
     """As a context: go round until it is left, which waits until all are hung up."""
 
-    def __init__(self, url: str, path: pathlib.Path, misdeeds: list[Misdeed], patience_s: float = PATIENCE_S):
+    def __init__(self, url: str, path: pathlib.Path, misdeeds: list[Misdeed], patience_s: float = PATIENCE_S,
+                 acts: list[Act] | None = None):
         parts = urllib.parse.urlsplit(url)
         self.address = (parts.hostname, parts.port)
         self.path = path  # of the names of what was done to this process, by earlier runs too
-        self.misdeeds, self.patience_s = misdeeds, patience_s
+        self.misdeeds, self.patience_s, self.acts = misdeeds, patience_s, acts or []
         self.there: list[Stranger] = []
         self.wrong: dict[str, list[str]] = {}
         self.stopped = threading.Event()
@@ -102,10 +109,14 @@ class Strangers:
         return effects
 
     def _go_round(self) -> None:
-        for misdeed in itertools.cycle(self.misdeeds):
+        for misdeed in itertools.cycle([*self.misdeeds, *self.acts]):
             try:
-                self._do(misdeed)
-            except OSError as error:
+                self._note(misdeed.name)
+                if isinstance(misdeed, Act):
+                    self._complain(misdeed, misdeed.act(self.address))
+                else:
+                    self._do(misdeed)
+            except (OSError, http.client.HTTPException) as error:
                 self._complain(misdeed, str(error))
             self._look()
             if self.stopped.wait(PACE_S):
@@ -114,16 +125,18 @@ class Strangers:
             time.sleep(PACE_S)
             self._look()
 
+    def _note(self, name: str) -> None:
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(name + "\n")
+
     def _do(self, misdeed: Misdeed) -> None:
         sends = misdeed.sends
         if (wanted := SCRIPT.encode()) in sends:
             sends = sends.replace(wanted, self._script())
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(misdeed.name + "\n")
         for _ in range(misdeed.times):
             connection = socket.socket()
             connection.settimeout(10.0)
-            if not misdeed.reads:
+            if misdeed.sips or not misdeed.reads:
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_MAXSEG, 536)
             connection.connect(self.address)
@@ -151,8 +164,8 @@ class Strangers:
                 continue
             stranger.connection.close()
             self.there.remove(stranger)
-            if what:
-                self._complain(stranger.misdeed, what)
+            self._complain(stranger.misdeed, what)
 
-    def _complain(self, misdeed: Misdeed, what: str) -> None:
-        self.wrong.setdefault(misdeed.name, []).append(what)
+    def _complain(self, misdeed: Misdeed | Act, what: str) -> None:
+        if what:
+            self.wrong.setdefault(misdeed.name, []).append(what)

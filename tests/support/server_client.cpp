@@ -59,12 +59,18 @@ ReceivedFrame parse_frame(const std::string& bytes) {
 
 }  // namespace
 
-RunningServer::RunningServer(const std::function<void(ServerConfig&)>& change) {
+ServerConfig quiet_config() {
   ServerConfig config;
   config.scenes = {"synth:city:2000"};
   config.port = 0;
-  config.admin_bind = "127.0.0.1:0";
+  config.admin_bind = "off";
   config.threads = 2;
+  return config;
+}
+
+RunningServer::RunningServer(const std::function<void(ServerConfig&)>& change) {
+  ServerConfig config = quiet_config();
+  config.admin_bind = "127.0.0.1:0";
   if (change) change(config);
   server_ = std::make_unique<Server>(config);
   thread_ = std::thread([this] { server_->run(); });

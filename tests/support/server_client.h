@@ -17,6 +17,21 @@
 
 namespace catgs::test {
 
+/// synth:city on a port of the system's choice, without an admin port.
+ServerConfig quiet_config();
+
+/// Stops a server that runs on another thread, also where a test throws.
+class Stopped {
+ public:
+  explicit Stopped(Server& server) : server_(server) {}
+  ~Stopped() { server_.stop(); }
+  Stopped(const Stopped&) = delete;
+  Stopped& operator=(const Stopped&) = delete;
+
+ private:
+  Server& server_;
+};
+
 /// A whole server in this process on ports of the system's choice, serving synth:city.
 class RunningServer {
  public:

@@ -7,7 +7,6 @@
 
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
-#include <dlfcn.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,22 +25,6 @@
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
-
-namespace {
-
-std::atomic<bool> network_fails{false};
-std::atomic<int> services{0};  // of the network thread
-
-}  // namespace
-
-/// Stands before that of the shared library.
-struct lws_context;
-extern "C" int lws_service(lws_context* context, int timeout_ms) {
-  static const auto service =
-      reinterpret_cast<decltype(&lws_service)>(::dlsym(RTLD_NEXT, "lws_service"));
-  ++services;
-  return network_fails ? -1 : service(context, timeout_ms);
-}
 
 namespace catgs::test {
 namespace {
@@ -79,25 +62,9 @@ class FailingExecutor final : public FrameExecutor {
   const std::atomic<bool>& fails_;
 };
 
-/// Also where a test throws: who waits for run() would wait for ever.
-class Stopped {
- public:
-  explicit Stopped(Server& server) : server_(server) {}
-  ~Stopped() { server_.stop(); }
-  Stopped(const Stopped&) = delete;
-  Stopped& operator=(const Stopped&) = delete;
-
- private:
-  Server& server_;
-};
-
 TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   std::atomic<bool> fails{false};
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.port = 0;
-  config.admin_bind = "off";
-  config.threads = 2;
+  const ServerConfig config = quiet_config();
   ServerParts parts;
   parts.wrap = [&](std::shared_ptr<FrameExecutor> executor) {
     return std::make_shared<FailingExecutor>(std::move(executor), fails);
@@ -245,97 +212,6 @@ TEST(ServerFaults, KeepsDescriptorsForItsWorkWhenACrowdTakesTheRest) {
     visitor.receive_frame();
   }
   EXPECT_TRUE(eventually(answers));
-}
-
-TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.port = 0;
-  config.admin_bind = "off";
-  config.threads = 2;
-  Server server(config);
-  auto ended = std::async(std::launch::async, [&] { server.run(); });
-  const Stopped stopped(server);
-  RawSocket waker(server.port());
-  EXPECT_EQ(http_get(server.port(), "/healthz").status, 200);
-  network_fails = true;
-  waker.send("G");
-  try {
-    ended.get();
-    FAIL() << "run() returned as if somebody had asked for it";
-  } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
-    EXPECT_STREQ(failure.what(), "the network thread failed");
-  }
-  network_fails = false;
-}
-
-/// How often libwebsockets looks what there is to do.
-int services_in(std::chrono::milliseconds time) {
-  const int before = services;
-  std::this_thread::sleep_for(time);
-  return services - before;
-}
-
-/// One connection that takes no more of its answer while libwebsockets has something to read of it.
-class UnreadAnswer : public testing::Test {
- protected:
-  UnreadAnswer() {
-    folder_.write("index.html", "<!doctype html>");
-    folder_.write("large.bin", std::string(large_bytes, 'l'));
-    server_.emplace([&](ServerConfig& config) { config.client_dir = folder_.path().string(); });
-    socket_.emplace(server_->port());
-  }
-  void expect_whole_answer() {
-    const std::string reply = socket_->receive(5s);
-    EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
-  }
-
-  static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
-  static constexpr std::string_view request = "GET /large.bin HTTP/1.1\r\nHost: localhost\r\n\r\n";
-  const TemporaryFolder folder_;
-  std::optional<RunningServer> server_;
-  std::optional<RawSocket> socket_;
-};
-
-TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatCameWithTheRequest) {
-  socket_->send(std::string(request) + "x");
-  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
-  expect_whole_answer();
-}
-
-TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatComeLater) {
-  socket_->send(request);
-  std::string head;
-  ASSERT_TRUE(socket_->receive_until("\r\n\r\n", head));
-  socket_->send(std::string(100'000, 'x'));
-  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
-}
-
-TEST_F(UnreadAnswer, KeepsNoThreadBusyWhereTheClientHasNoMoreToSay) {
-  socket_->send(request);
-  socket_->end_sending();
-  EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
-  expect_whole_answer();
-}
-
-TEST(ServerFaults, ClosingAWebsocketThatReadsNothingKeepsNoThreadBusy) {
-  const TemporaryFolder folder;
-  save_scene(random_cloud(1, 0), folder / "a.ply");
-  for (int i = 0; i < 3000; ++i)  // a welcome has all names
-    std::filesystem::create_hard_link(
-        folder / "a.ply", folder / (std::to_string(i) + std::string(100, 'n') + ".ply"));
-  const RunningServer server([&](ServerConfig& config) { config.scene_folders = {folder.path()}; });
-  RawSocket socket(server.port(), true);
-  socket.send(handshake(server.port()));
-  socket.send(
-      client_frame(ws_fin | ws_binary, hello_message(64, 64, v1::CODEC_H264).SerializeAsString()));
-  std::string received;
-  ASSERT_TRUE(socket.receive_until("nnnnn", received));
-  const std::string refused = client_frame(ws_fin | ws_text, "hello");
-  socket.send(refused);
-  ASSERT_TRUE(eventually([&] { return metric(server, "catgs_bad_messages_total") == 1.0; }));
-  socket.send(refused);
-  EXPECT_LT(services_in(1s), 9000);  // tens of thousands without the pauses
 }
 
 /// A library under --renderer auto whose first scene the processors render, and what it answers

@@ -105,7 +105,7 @@ TEST_F(Films, OfStrangersAreUnknownAndTakeNoPlace) {
   for (const char* path : {"/api/films/guess", "/api/films/guess/file"})
     EXPECT_EQ(http_get(server->port(), path).status, 404) << path;
   std::vector<RawSocket> strangers;
-  for (std::size_t i = 0; i < 2 * UploadPlaces::places; ++i) {
+  for (std::size_t i = 0; i < 2 * UploadPlaces::small.all; ++i) {
     strangers.emplace_back(server->port());
     strangers.back().send(
         "PUT /api/films/guess/cancel HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n");

@@ -12,6 +12,7 @@
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/tls.h"
 
 namespace catgs::test {
 namespace {
@@ -50,6 +51,7 @@ class HttpConformance : public testing::Test {
     server.emplace([&](ServerConfig& config) {
       config.client_dir = (folder / "web").string();
       config.max_sessions = 64;
+      config.max_sessions_per_address = 150;  // connections follow it (AcceptGate::bounds_for)
     });
   }
 
@@ -300,8 +302,14 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
 
 /// Slow senders, the silent, who does not read, and websockets that do not answer pings: all at
 /// once, because each takes its time. `request_timeout_s` is 10, `hang_up_after_s` 30
-/// (server/net/net_server.cpp), `body_time_us` and `piece_timeout_s` 30 (server/net/lws_http.cpp).
+/// (server/net/net_server.cpp), `grace` 10 (server/net/body_deadline.h) and `piece_timeout_s` 30
+/// (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
+  write_self_signed(folder / "certificate.pem", folder / "key.pem");
+  const RunningServer https([&](ServerConfig& config) {
+    config.tls_cert = (folder / "certificate.pem").string();
+    config.tls_key = (folder / "key.pem").string();
+  });
   const std::size_t before = open_descriptors();
   {
     std::vector<RawSocket> slow;
@@ -313,8 +321,14 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
     }
     std::vector<RawSocket> silent;
     for (int i = 0; i < 20; ++i) silent.emplace_back(server->port());
+    for (const char* begun : {"", "\x16", "\x16\x03\x01\x02"}) {  // handshakes of TLS
+      silent.emplace_back(https.port());
+      silent.back().send(begun);
+      slow.emplace_back(https.port());
+      slow.back().send(begun);
+    }
     // X-A is the beginning of a name that libwebsockets knows, and it waits for the rest.
-    silent.back().send("GET /healthz HTTP/1.1\r\n" + host() + "X-A: 1\r\n\r\n");
+    silent.front().send("GET /healthz HTTP/1.1\r\n" + host() + "X-A: 1\r\n\r\n");
     RawSocket reads_nothing(server->port(), true);
     reads_nothing.send("GET /large.bin HTTP/1.1\r\n" + host() + "\r\n");
     RawSocket half_open(server->port());

@@ -240,7 +240,7 @@ TEST_F(SidecarUpload, BeyondItsPlacesIsToldToComeAgain) {
   const std::string greedy = token("author");
   const std::string others[] = {token("author", "", 2'000'000'000'000),
                                 token("author", "", 3'000'000'000'000)};
-  for (std::size_t i = 0; i < UploadPlaces::places_of_a_link; ++i) begin(greedy);
+  for (std::size_t i = 0; i < UploadPlaces::small.of_a_link; ++i) begin(greedy);
   ASSERT_TRUE(eventually([&] { return put(greedy).status == 503; }));
   const HttpReply refused = put(greedy);
   EXPECT_EQ(refused.headers.at("retry-after"), "1");
@@ -253,7 +253,7 @@ TEST_F(SidecarUpload, BeyondItsPlacesIsToldToComeAgain) {
   ASSERT_TRUE(eventually([&] {
     begin(others[0]);
     return put(others[1]).status == 503;
-  })) << "all are taken";
+  })) << "all that one address may have are taken";
   EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
   slow.clear();
   EXPECT_TRUE(eventually([&] { return put(greedy).status == 200; })) << "they are free again";
@@ -271,7 +271,7 @@ TEST_F(SidecarUpload, OfWhoHasGoneIsNotSaved) {
 TEST_F(SidecarUpload, UnderWayWhenTheServerStopsIsAnswered) {
   const std::string author = token("author");
   std::vector<RawSocket> late;
-  for (std::size_t i = 0; i < UploadPlaces::places_of_a_link; ++i) {
+  for (std::size_t i = 0; i < UploadPlaces::small.of_a_link; ++i) {
     late.emplace_back(server->port());
     late.back().send(head(author, sidecar.size()) + std::string(sidecar.substr(0, 9)));
   }

@@ -8,43 +8,58 @@
 namespace catgs {
 namespace {
 
+using Held = std::vector<std::shared_ptr<UploadPlace>>;
+
 TEST(UploadPlaces, AreAFewAndFreeAgainWhenNobodyHoldsThem) {
-  UploadPlaces places;
-  std::vector<std::shared_ptr<UploadPlace>> held;
-  for (std::size_t i = 0; i < UploadPlaces::places; ++i)
-    held.push_back(places.take("link " + std::to_string(i)));
-  EXPECT_EQ(places.taken(), UploadPlaces::places);
-  EXPECT_EQ(places.take("one more"), nullptr);
+  UploadPlaces places(UploadPlaces::small);
+  Held held;
+  for (std::size_t i = 0; i < UploadPlaces::small.all; ++i)
+    held.push_back(places.take("link " + std::to_string(i), "address " + std::to_string(i)));
+  EXPECT_EQ(places.taken(), UploadPlaces::small.all);
+  EXPECT_EQ(places.take("one more", "elsewhere"), nullptr);
   const std::shared_ptr<const UploadPlace> saver = held.back();
   held.back()->abandon();
   held.pop_back();
-  EXPECT_EQ(places.take("one more"), nullptr) << "its body is still in memory";
+  EXPECT_EQ(places.take("one more", "elsewhere"), nullptr) << "its body is still in memory";
   EXPECT_TRUE(saver->abandoned());
   held.pop_back();
-  EXPECT_EQ(places.taken(), UploadPlaces::places - 1);
-  const auto place = places.take("one more");
+  EXPECT_EQ(places.taken(), UploadPlaces::small.all - 1);
+  const auto place = places.take("one more", "elsewhere");
   ASSERT_TRUE(place);
   EXPECT_FALSE(place->abandoned());
 }
 
 TEST(UploadPlaces, OneLinkLeavesSomeToOthers) {
-  UploadPlaces places;
-  std::vector<std::shared_ptr<UploadPlace>> held;
-  while (auto place = places.take("greedy")) held.push_back(std::move(place));
-  EXPECT_EQ(held.size(), UploadPlaces::places_of_a_link);
-  EXPECT_TRUE(places.take("another"));
+  UploadPlaces places(UploadPlaces::small);
+  Held held;
+  while (auto place = places.take("greedy", std::to_string(held.size())))
+    held.push_back(std::move(place));
+  EXPECT_EQ(held.size(), UploadPlaces::small.of_a_link);
+  EXPECT_TRUE(places.take("another", "elsewhere"));
   held.pop_back();
-  EXPECT_TRUE(places.take("greedy"));
+  EXPECT_TRUE(places.take("greedy", "elsewhere"));
+}
+
+TEST(UploadPlaces, OneAddressLeavesSomeToOthers) {
+  for (const UploadPlaces::Bounds& bounds : {UploadPlaces::small, UploadPlaces::large}) {
+    UploadPlaces places(bounds);
+    Held held;
+    while (auto place = places.take(std::to_string(held.size()), "greedy"))
+      held.push_back(std::move(place));
+    EXPECT_EQ(held.size(), bounds.of_an_address);
+    EXPECT_LT(held.size(), bounds.all);
+    EXPECT_TRUE(places.take("another", "elsewhere"));
+  }
 }
 
 TEST(UploadPlaces, ForLargeBodiesAreFewer) {
-  UploadPlaces places(UploadPlaces::large_places, UploadPlaces::large_places_of_a_link);
-  const auto first = places.take("greedy");
+  UploadPlaces places(UploadPlaces::large);
+  const auto first = places.take("greedy", "here");
   EXPECT_TRUE(first);
-  EXPECT_FALSE(places.take("greedy"));
-  const auto second = places.take("another");
+  EXPECT_FALSE(places.take("greedy", "elsewhere"));
+  const auto second = places.take("another", "elsewhere");
   EXPECT_TRUE(second);
-  EXPECT_FALSE(places.take("one more"));
+  EXPECT_FALSE(places.take("one more", "far away"));
 }
 
 }  // namespace
