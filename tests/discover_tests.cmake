@@ -1,5 +1,6 @@
 # Writes the CTest tests of the GoogleTest program PROGRAM into FILE: one a suite, NAME.SUITE, which leaves
-# RESULTS/NAME.SUITE.xml for report.py. LONG names suites that start first, as SUITE or, in N parts, SUITE:N.
+# RESULTS/NAME.SUITE.xml for report.py. LONG names suites that start first, as SUITE or, in N parts, SUITE:N, with
+# commas between them.
 # With PARAMETERS_OF, a filter of one parameterised test, one a parameter instead: NAME.PARAMETER.
 if(NOT PARAMETERS_OF)
   set(PARAMETERS_OF *)
@@ -10,6 +11,7 @@ if(NOT status EQUAL 0)
   message(FATAL_ERROR "${PROGRAM} --gtest_list_tests failed (${status}):\n${list}")
 endif()
 
+string(REPLACE "," ";" long_suites "${LONG}")
 set(script "")
 function(add name filter environment cost)
   set(output "")
@@ -35,7 +37,7 @@ else()
     string(REGEX REPLACE "[\n.]" "" suite ${suite})
     set(cost 0)
     set(parts 1)
-    foreach(long ${LONG})
+    foreach(long ${long_suites})
       if(long MATCHES "^([^:]+):?([0-9]*)$" AND CMAKE_MATCH_1 STREQUAL suite)
         set(cost 100)
         if(CMAKE_MATCH_2)

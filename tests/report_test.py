@@ -219,7 +219,7 @@ class Discovery(Run):
         self.assertEqual((properties["LABELS"], properties["TIMEOUT"]), (["unit"], 60))
 
     def test_a_long_suite_starts_first_and_in_parts(self):
-        tests = self.discover("-DNAME=test_a", "-DLONG=In/P;Plain:2")
+        tests = self.discover("-DNAME=test_a", "-DLONG=In/P,Plain:2")
         self.assertEqual(list(tests), ["test_a.Plain.1of2", "test_a.Plain.2of2", "test_a.Typed/0", "test_a.In/P"])
         properties = {entry["name"]: entry["value"] for entry in tests["test_a.Plain.2of2"]["properties"]}
         self.assertEqual(properties["ENVIRONMENT"], ["GTEST_TOTAL_SHARDS=2", "GTEST_SHARD_INDEX=1"])
