@@ -16,8 +16,7 @@ build_packages=(
   libwebp-dev libpng-dev zlib1g-dev libzstd-dev libarchive-dev
 )
 lan_packages=(openssl qrencode iproute2)
-test_packages=(libgtest-dev libgmock-dev python3 shellcheck cppcheck clang-format-14 clang libclang-rt-dev
-  haproxy universal-ctags)
+test_packages=(libgtest-dev libgmock-dev python3 shellcheck cppcheck clang-format-14 haproxy universal-ctags)
 # What reads deploy/ and docker/: containers without a Docker engine, and the tools of operators.
 # runc and kubectl often come from elsewhere, and those conflict with the packages.
 deploy_test_packages=(

@@ -61,7 +61,7 @@ main() {
   parse_arguments "$@"
   detect_distribution
   if ((full)); then
-    test_packages+=(clang-tidy-14 debootstrap "${deploy_test_packages[@]}")
+    test_packages+=(clang clang-tidy-14 libclang-rt-dev debootstrap "${deploy_test_packages[@]}")
   fi
   steps_begin 4 "$log"
   ensure_packages "${build_packages[@]}" "${test_packages[@]}"
@@ -78,9 +78,9 @@ main() {
   lock_build release
   configure_build release "${cuda_options[@]}"
   build_all release "Build with tests"
-  rm -f "$build_dir/tests.xml"
+  rm -rf "$build_dir/tests.xml" "$build_dir/tests/suites"
   step "Test" run_tests
-  python3 -B "$SOURCE_DIR/tests/report.py" "$build_dir/tests.xml" "$log"
+  python3 -B "$SOURCE_DIR/tests/report.py" "$build_dir/tests.xml" "$build_dir/tests/suites" "$log"
 }
 
 main "$@"

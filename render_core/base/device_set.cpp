@@ -37,11 +37,10 @@ std::vector<int> DeviceSet::among(int count) const {
   return devices;
 }
 
-DeviceSet::Place::~Place() {
-  if (!set_) return;
-  const std::lock_guard lock(set_->mutex_);
-  --set_->views_[device_];
-  if (measurement_ == set_->measurements_) --set_->views_since_[device_];
+void DeviceSet::give_back(int device, std::uint64_t measurement) {
+  const std::lock_guard lock(mutex_);
+  --views_[device];
+  if (measurement == measurements_) --views_since_[device];
 }
 
 DeviceSet::Place DeviceSet::take(std::span<const int> devices) {
@@ -53,7 +52,9 @@ DeviceSet::Place DeviceSet::take(std::span<const int> devices) {
   const int device = *std::ranges::min_element(devices, {}, load);
   ++views_[device];
   ++views_since_[device];
-  return {shared_from_this(), device, measurements_};
+  return {device, [set = shared_from_this(), device, measurement = measurements_] {
+            set->give_back(device, measurement);
+          }};
 }
 
 void DeviceSet::set_loads(std::map<int, double> loads) {

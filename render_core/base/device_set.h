@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -26,17 +27,18 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   /// A View's place on a device; its destructor gives the place back.
   class Place {
    public:
-    Place(Place&& other) noexcept = default;
-    ~Place();
+    Place(int device, std::function<void()> give_back)
+        : device_(device), give_back_(std::move(give_back)) {}
+    Place(Place&& other) noexcept
+        : device_(other.device_), give_back_(std::exchange(other.give_back_, nullptr)) {}
+    ~Place() {
+      if (give_back_) give_back_();
+    }
     [[nodiscard]] int device() const { return device_; }
 
    private:
-    friend class DeviceSet;
-    Place(std::shared_ptr<DeviceSet> set, int device, std::uint64_t measurement)
-        : set_(std::move(set)), device_(device), measurement_(measurement) {}
-    std::shared_ptr<DeviceSet> set_;  // null: moved from
     int device_;
-    std::uint64_t measurement_;  // the last set_loads() before this Place was taken
+    std::function<void()> give_back_;  // empty: moved from
   };
   /// A place on the least loaded of `devices` (not empty). A View without a measured load counts as
   /// much as the average View. Without set_loads() the choice is therefore the device with the
@@ -52,6 +54,9 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   [[nodiscard]] std::map<int, int> views() const;
 
  private:
+  /// Ends a Place on `device` that was taken after so many set_loads().
+  void give_back(int device, std::uint64_t measurement);
+
   const std::vector<int> wanted_;
   mutable std::mutex mutex_;
   std::map<int, int> views_;

@@ -1,4 +1,8 @@
-"""Checks of declarations, by universal-ctags: what nothing uses, and what has grown too large."""
+"""Checks of declarations, by universal-ctags: what nothing uses, and what has grown too large.
+
+Methods of a class are those that it declares, each overload, without constructors, the destructor and operators.
+Fields are its own and those of its anonymous structs and unions.
+"""
 
 import collections
 import json
@@ -8,13 +12,20 @@ import subprocess
 from typing import Iterator, NamedTuple
 
 MAX_FUNCTION_LINES = 70
-MAX_METHODS = 25
+MAX_METHODS = 23
 MAX_FIELDS = 20
-# A ratchet: these may shrink, never grow. Functions by "file: name", classes by name.
+# A ratchet: these may shrink, never grow, and leave the list when they meet the limit. Functions by "file: name",
+# classes by name.
 LONGER_FUNCTIONS = {
     "tests/render_core/scene/formats/encoders.cpp: encode_sog": 101,
 }
-LARGER_CLASSES = {
+MORE_METHODS = {
+    "Audience": 25, "FlowControl": 25, "Place": 25, "Places": 25, "SceneLibrary": 25, "StreamControl": 25,
+    "TreeShape": 25, "Visit": 25,
+}
+MORE_FIELDS = {"Server::State": 26}
+# Classes of many fields, since each is a row of a table.
+TABLES = {
     "Metrics": "one field a metric",
     "ServerConfig": "one field a setting",
     "ViewMemory": "one field a buffer, by the table of a View's memory",
@@ -32,6 +43,7 @@ USED_ELSEWHERE = {
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 WORD = re.compile(r"[A-Za-z_]\w*")
 METHODS = {"prototype", "function"}
+CLASSES = {"class", "struct", "union"}
 
 
 class Tag(NamedTuple):
@@ -41,40 +53,73 @@ class Tag(NamedTuple):
     line: int
     end: int
     scope: str
+    typeref: str
 
 
 def ctags(tool: str, root: pathlib.Path, paths: list[str]) -> list[Tag]:
     command = [tool, "--options=NONE", "--quiet", "--output-format=json", "-f", "-", "-L", "-",
-               "--langmap=C++:+.h.cu.cuh", "--kinds-C++=+p-hdl", "--fields=+neKs", "-I", "__launch_bounds__+"]
+               "--langmap=C++:+.h.cu.cuh", "--kinds-C++=+p-hdl", "--fields=+neKst", "-I", "__launch_bounds__+"]
     result = subprocess.run(command, input="\n".join(paths), cwd=root, capture_output=True, text=True, check=True)
-    tags = []
-    for line in result.stdout.splitlines():
-        tag = json.loads(line)
-        if tag["_type"] == "tag" and not tag["name"].startswith("__anon"):
-            tags.append(Tag(tag["name"], tag["kind"], tag["path"], tag["line"], tag.get("end", tag["line"]),
-                            tag.get("scope", "")))
-    return tags
+    found = [tag for tag in map(json.loads, result.stdout.splitlines()) if tag["_type"] == "tag"]
+    return [Tag(tag["name"], tag["kind"], tag["path"], tag["line"], tag.get("end", tag["line"]),
+                tag.get("scope", ""), tag.get("typeref", "")) for tag in found]
+
+
+def short_name(scope: str) -> str:
+    """A class's name with the classes around it and without namespaces, as the lists above have it."""
+    return re.sub(r"^([a-z]\w*::|__anon\w+::)+", "", scope)
+
+
+def class_sizes(tags: list[Tag]) -> tuple[dict[str, int], dict[str, int]]:
+    """How many methods and fields each class has, by its whole name."""
+    methods, fields = collections.Counter(), collections.Counter()
+    classes = {(tag.path, f"{tag.scope}::{tag.name}" if tag.scope else tag.name): range(tag.line, tag.end + 1)
+               for tag in tags if tag.kind in CLASSES}
+    for tag in tags:
+        # Not a definition that stands outside its class.
+        declared = tag.line in classes.get((tag.path, tag.scope), ())
+        constructor = tag.name == tag.scope.split("::")[-1]
+        if tag.kind in METHODS and declared and not constructor and not tag.name.startswith(("operator", "~", "__anon")):
+            methods[tag.scope] += 1
+        # What an anonymous struct holds counts, and not the name that holds it.
+        if tag.kind == "member" and not re.search(r":__anon\w+$", tag.typeref):
+            scope = tag.scope
+            while (tag.path, scope) in classes and scope.split("::")[-1].startswith("__anon"):
+                scope = scope.rpartition("::")[0]
+            fields[scope] += 1
+    return methods, fields
 
 
 def size_findings(tags: list[Tag]) -> Iterator[str]:
     """Functions and classes beyond their limits, as 'file:line: text'."""
-    methods, fields = collections.defaultdict(set), collections.Counter()
+    methods, fields = class_sizes(tags)
     for tag in tags:
+        place = f"{tag.path}:{tag.line}: {tag.name}"
         length = tag.end - tag.line + 1
         if tag.kind == "function" and length > LONGER_FUNCTIONS.get(f"{tag.path}: {tag.name}", MAX_FUNCTION_LINES):
-            yield f"{tag.path}:{tag.line}: {tag.name} has {length} lines, the limit is {MAX_FUNCTION_LINES}: split it"
-        fields[tag.scope] += tag.kind == "member"
-        constructor = tag.name == tag.scope.split("::")[-1]
-        if tag.kind in METHODS and not constructor and not tag.name.startswith(("operator", "~")):
-            methods[tag.scope].add((tag.name, tag.line if tag.path.endswith(".h") else 0))
-    for tag in tags:
-        if tag.kind not in ("class", "struct") or tag.name in LARGER_CLASSES or tag.path.startswith("tests/"):
+            yield f"{place} has {length} lines, the limit is {MAX_FUNCTION_LINES}: split it"
+        if tag.kind not in CLASSES or tag.name.startswith("__anon") or tag.path.startswith("tests/"):
             continue
         scope = f"{tag.scope}::{tag.name}" if tag.scope else tag.name
-        own = sum(line > 0 for _, line in methods[scope])
-        for count, what, limit in ((own, "methods", MAX_METHODS), (fields[scope], "fields", MAX_FIELDS)):
-            if count > limit:
-                yield f"{tag.path}:{tag.line}: {tag.name} has {count} {what}, the limit is {limit}: split it"
+        name = short_name(scope)
+        for count, what, limit, listed in ((methods[scope], "methods", MAX_METHODS, MORE_METHODS),
+                                           (fields[scope], "fields", MAX_FIELDS, MORE_FIELDS)):
+            if count > listed.get(name, limit) and not (what == "fields" and name in TABLES):
+                yield f"{place} has {count} {what}, the limit is {limit}: split it"
+
+
+def stale_findings(tags: list[Tag]) -> Iterator[str]:
+    """Names on the lists above that need not stand there any more, as 'file:line: text'."""
+    methods, fields = ({short_name(scope): count for scope, count in sorted(sizes.items(), key=lambda size: size[1])}
+                       for sizes in class_sizes(tags))
+    lengths = {f"{tag.path}: {tag.name}": tag.end - tag.line + 1 for tag in tags if tag.kind == "function"}
+    for title, listed, sizes, limit in (("LONGER_FUNCTIONS", LONGER_FUNCTIONS, lengths, MAX_FUNCTION_LINES),
+                                        ("MORE_METHODS", MORE_METHODS, methods, MAX_METHODS),
+                                        ("MORE_FIELDS", MORE_FIELDS, fields, MAX_FIELDS),
+                                        ("TABLES", TABLES, fields, MAX_FIELDS)):
+        for name in listed:
+            if sizes.get(name, 0) <= limit:
+                yield f"tests/lint/declarations.py:1: {name} meets the limit of {limit}: take it off {title}"
 
 
 def unused_findings(tags: list[Tag], code: dict[str, str]) -> Iterator[str]:
@@ -85,7 +130,8 @@ def unused_findings(tags: list[Tag], code: dict[str, str]) -> Iterator[str]:
         words.update(WORD.findall(COMMENT.sub("", text)))
     places = collections.defaultdict(set)
     for tag in tags:
-        places[tag.name].add((tag.path, tag.line))
+        if not tag.name.startswith("__anon"):
+            places[tag.name].add((tag.path, tag.line))
     for name, found in places.items():
         if WORD.fullmatch(name) and name not in USED_ELSEWHERE and words[name] <= len(found):
             path, line = min(found)

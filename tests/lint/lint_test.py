@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Plants one fault of each kind and requires that `lint.py rules` reports it, and nothing else."""
 
+import contextlib
 import pathlib
 import re
 import shutil
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 import declarations
 import lint
@@ -72,6 +74,22 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("marker word", "server/a.cpp", "// TO" "DO: later")
         self.expect_one("#pragma once", "server/a.h", "int x;")
 
+    def test_many_imports(self):
+        many = [f'#include "server/net/a{i}.h"' for i in range(lint.MAX_IMPORTS + 1)]
+        self.expect_one("includes 21 files of ours, the limit is 20", "server/net/a.cpp", *many)
+        self.assertEqual(self.findings("server/net/a.cpp", "#include <vector>", *many[1:], many[1]), [])
+        modules = [f"import {{ a{i} }} from './a{i}';" for i in range(lint.MAX_IMPORTS)]
+        self.expect_one("includes 21 files of ours", "web_client/src/ui/a.ts", *modules, "import '../base/a';")
+        with unittest.mock.patch.dict(lint.MORE_IMPORTS, {"server/net/a.cpp": 22}):
+            self.assertEqual(self.findings("server/net/a.cpp", *many), [])
+            self.expect_one("take it off", "server/net/a.cpp", *many[1:])
+
+    def test_friend_classes(self):
+        self.expect_one("are one", "server/net/a.h", "#pragma once", "  friend class B;")
+        self.expect_one("are one", "tests/a.cpp", "  friend struct b::C<int>;")
+        self.expect_one("are one", "render_core/cuda/a.cuh", "#pragma once", "  friend B;")
+        self.assertEqual(self.findings("server/net/a.cpp", "  friend bool operator==(const A&, const A&) = default;"), [])
+
     def test_banned_calls(self):
         self.expect_one("beyond its buffer", "server/a.cpp", "  strcpy(to, from);")
         self.expect_one("half a number", "server/net/a.cpp", "  return std::stoi(text);")
@@ -123,13 +141,49 @@ class Declarations(unittest.TestCase):
         self.assertEqual(sorted(line.split(":", 2)[2].split(",")[0] for line in found),
                          [" B has 72 lines", " B has 72 lines", " a has 72 lines"])
 
+    def sizes(self, *lines, path="server/a.h"):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            (root / path).parent.mkdir(parents=True)
+            (root / path).write_text("\n".join(lines) + "\n", "utf-8")
+            return list(declarations.size_findings(declarations.ctags("ctags", root, [path])))
+
     def test_large_classes(self):
-        many = [f"  int f{i}();" for i in range(26)] + [f"  int x{i}_;" for i in range(21)]
-        used = " ".join(f"f{i} x{i}_" for i in range(26))
-        found = self.findings({"server/a.h": ["class A {", *many, "};"],
-                               "server/a.cpp": ['#include "server/a.h"', f"A a; {used}"]})
-        self.assertEqual(found, ["server/a.h:1: A has 26 methods, the limit is 25: split it",
-                                 "server/a.h:1: A has 21 fields, the limit is 20: split it"])
+        methods, fields = [f"  int f{i}();" for i in range(24)], [f"  int x{i}_;" for i in range(21)]
+        for path in ("server/a.h", "server/a.cpp", "render_core/cuda/a.cuh"):
+            self.assertEqual(self.sizes("namespace {", "class A {", "  A();", "  ~A();", *methods, *fields, "};", "}",
+                                        *(f"int A::f{i}() {{ return 0; }}" for i in range(24)), path=path),
+                             [f"{path}:2: A has 24 methods, the limit is 23: split it",
+                              f"{path}:2: A has 21 fields, the limit is 20: split it"])
+            self.assertEqual(self.sizes("class A {", *methods[1:], *fields[1:], "};", path=path), [])
+
+    def test_anonymous_structs_hide_no_fields(self):
+        hidden = ["  struct {", *(f"    int y{i};" for i in range(6)), "    union { int z1; int z2; };", "  } held;"]
+        fields = [f"  int x{i};" for i in range(13)]
+        self.assertEqual(self.sizes("struct A {", *fields, *hidden, "};"),
+                         ["server/a.h:1: A has 21 fields, the limit is 20: split it"])
+        self.assertEqual(self.sizes("struct A {", *fields[1:], *hidden, "};"), [])
+        self.assertEqual(self.sizes("struct A {", *fields, *hidden[:1], "  };", "};"), [])
+
+    def test_what_meets_the_limit_leaves_the_list(self):
+        lists = {"LONGER_FUNCTIONS": ["server/a.cpp: a"], "MORE_METHODS": ["A"], "MORE_FIELDS": ["A::B"], "TABLES": ["T"]}
+        with contextlib.ExitStack() as stack:
+            for name, listed in lists.items():
+                stack.enter_context(unittest.mock.patch.object(declarations, name, dict.fromkeys(listed, 99)))
+            body = ["    a();"] * declarations.MAX_FUNCTION_LINES
+            large = ["namespace catgs {", "struct A {", *(f"  int f{i}();" for i in range(24)),
+                     "  struct B {", *(f"    int x{i};" for i in range(21)), "  };", "};",
+                     "struct T {", *(f"  int y{i};" for i in range(21)), "};", "void a() {", *body, "}", "}"]
+            with tempfile.TemporaryDirectory() as folder:
+                root = pathlib.Path(folder)
+                (root / "server").mkdir()
+                for lines, stale in ((large, []), ([], sorted(sum(lists.values(), [])))):
+                    (root / "server/a.cpp").write_text("\n".join(lines) + "\n", "utf-8")
+                    tags = declarations.ctags("ctags", root, ["server/a.cpp"])
+                    found = sorted(line.split(": ", 1)[1].split(" meets")[0]
+                                   for line in declarations.stale_findings(tags))
+                    self.assertEqual(found, stale)
+                    self.assertEqual(list(declarations.size_findings(tags)), [])
 
     def test_what_nothing_uses(self):
         found = self.findings({"server/a.h": ["int used();  // unused", "int unused();"],
