@@ -62,7 +62,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "web_client/src/ui/viewer",
     "web_client/src/main",
 ]) for name in line.split()}
-LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!wire/generated/)")
+LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!\w+/generated/)")
 
 
 INCLUDE_RULES = [
@@ -86,7 +86,7 @@ INCLUDE_RULES = [
 ]
 # TypeScript follows the same idea by module path.
 IMPORT_RULES = [
-    IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|/generated/",
+    IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|wire/generated/",
                 "src/wire alone speaks protobuf"),
     IncludeRule(r"^web_client/src/ui/", r"^\.\./(transport/|worker/worker$|session/session$)",
                 "the page speaks to the worker through worker/client"),

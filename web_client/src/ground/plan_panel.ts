@@ -67,7 +67,7 @@ export class PlanPanel {
     this.host_.replaceChildren(this.picture_, make('div', { className: 'row' }, this.storeys_, this.house_, this.view_up_, this.size_));
     this.storeys_.hidden = map_.storeys.length < 2;
     this.storeys_.append(
-      ...map_.storeys.map((_, k) => new Option(text.ground.storey_numbered(number(k + 1)), String(k))).reverse(),
+      ...map_.storeys.map((_, k) => new Option(text.ground.storey_numbered({ n: k + 1 }), String(k))).reverse(),
     );
     this.storeys_.addEventListener('change', () => {
       this.choose_storey(Number(this.storeys_.value));
@@ -110,7 +110,7 @@ export class PlanPanel {
 
   private make_stops(stops: readonly Stop[]): void {
     this.stops_ = stops.map((stop, i) => {
-      const title = stop.title || text.tour.stop_numbered(number(i + 1));
+      const title = stop.title || text.tour.stop_numbered({ n: i + 1 });
       const button = make('button', { type: 'button', className: 'plan-stop', hidden: true, title, 'aria-label': title }, number(i + 1));
       button.addEventListener('click', () => this.parts_.go_to_stop(i));
       return { stop, stand: this.parts_.stand_at(stop.eye.position), button };

@@ -1,5 +1,4 @@
 // The author's fields for pictures, films, voices and sounds.
-import { number } from '../text/number';
 import { text } from '../text/text';
 import { max_media, max_text_characters } from '../tour/limits';
 import { accepted, kind_of, media_kinds, usual_volume, type MediaKind, type Medium } from '../tour/media';
@@ -37,7 +36,7 @@ export class AuthorMedia implements MediaFields {
     const set: SetMedium = (i, changed, field) =>
       change({ media: (stop().media ?? []).map((medium, j) => (j === i ? { ...medium, ...changed(medium) } : medium)) }, field);
     const rows = media.map((medium, i) => {
-      const drop = make('button', { type: 'button', 'aria-label': words.remove(medium.src), title: words.remove(medium.src) }, '×');
+      const drop = make('button', { type: 'button', 'aria-label': words.remove({ name: medium.src }), title: words.remove({ name: medium.src }) }, '×');
       drop.addEventListener('click', () => change({ media: (stop().media ?? []).filter((_, j) => j !== i) }));
       const name = make('div', { className: 'medium' }, make('span', { dir: 'ltr' }, medium.src), drop);
       const row = make('section', {}, name, this.alt_of(medium, i, language, set));
@@ -60,7 +59,7 @@ export class AuthorMedia implements MediaFields {
     const parts = [...rows, ...(media.length < max_media ? [add] : []), voice];
     if (narration) parts.push(this.captions_of(narration.captions, narration.src, (captions) => change({ narration: { ...narration, captions } })));
     const count = media.length + (narration ? 1 : 0);
-    return this.details(`stop ${n}`, count > 0 ? words.of_stop_count(number(count)) : words.of_stop, parts);
+    return this.details(`stop ${n}`, count > 0 ? words.of_stop_count({ count }) : words.of_stop, parts);
   }
 
   of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement {
@@ -81,7 +80,7 @@ export class AuthorMedia implements MediaFields {
     const alt = make('input', {
       ...{ value: own ? medium.alt : (medium.alt_in.get(language) ?? ''), maxLength: max_text_characters, dir: 'auto', lang: language },
       ...{ placeholder: own ? text.media.alt_hint : medium.alt, required: own && medium.kind === 'image' },
-      'aria-label': text.media.alt(medium.src),
+      'aria-label': text.media.alt({ name: medium.src }),
     });
     alt.dataset['control'] = `alt ${i}`;
     alt.addEventListener('input', () => {
@@ -95,7 +94,7 @@ export class AuthorMedia implements MediaFields {
 
   private captions_of(value: string, src: string, chosen: (name: string) => void): HTMLElement {
     return this.choice({
-      ...{ label: text.media.captions_of(src), control: `captions ${src}`, kinds: ['captions'], value, none: text.media.none, chosen },
+      ...{ label: text.media.captions_of({ name: src }), control: `captions ${src}`, kinds: ['captions'], value, none: text.media.none, chosen },
     });
   }
 
@@ -124,8 +123,8 @@ export class AuthorMedia implements MediaFields {
     select.addEventListener('focus', fill); // others may have been sent meanwhile
     select.addEventListener('change', () => chosen(select.value));
     const said = make('output', { 'aria-live': 'polite' });
-    const file = make('input', { type: 'file', accept: accepted(kinds), hidden: true, 'aria-label': words.upload_for(label) });
-    const button = make('button', { type: 'button', 'aria-label': words.upload_for(label) }, words.upload);
+    const file = make('input', { type: 'file', accept: accepted(kinds), hidden: true, 'aria-label': words.upload_for({ label }) });
+    const button = make('button', { type: 'button', 'aria-label': words.upload_for({ label }) }, words.upload);
     button.addEventListener('click', () => file.click());
     file.addEventListener('change', () => {
       const [sent] = file.files ?? [];
@@ -146,7 +145,7 @@ export class AuthorMedia implements MediaFields {
       const name = await shelf.add(file, (words) => (said.textContent = words));
       said.textContent = '';
       if (button.isConnected) chosen(name);
-      else by_id('author-said', HTMLOutputElement).textContent = text.media.sent(name);
+      else by_id('author-said', HTMLOutputElement).textContent = text.media.sent({ name });
     } catch (error) {
       said.textContent = error instanceof Error ? error.message : String(error);
     }

@@ -35,7 +35,7 @@ export class MediaShelf {
     if (file.size > max_media_bytes) throw new Error(text.media.too_large);
     const name = free_name(file.name, this.names);
     const path = scene_path(this.scene_id, `media/${encodeURIComponent(name)}`);
-    await send(server_address(location.href, path), this.token_, file, (share) => progress(text.media.sending(number(share, { style: 'percent' }))));
+    await send(server_address(location.href, path), this.token_, file, (share) => progress(text.media.sending({ share: number(share, { style: 'percent' }) })));
     this.names = [...this.names, name].sort();
     return name;
   }
@@ -65,9 +65,9 @@ function send(address: URL, token: string, file: File, sent: (share: number) => 
     request.onload = () => {
       const { status, responseText: answer } = request;
       if (status === 200) resolve();
-      else reject(new Error(text.media.not_kept(refusal(status, answer))));
+      else reject(new Error(text.media.not_kept({ why: refusal(status, answer) })));
     };
-    request.onerror = () => reject(new Error(text.media.not_kept(text.author.unreachable)));
+    request.onerror = () => reject(new Error(text.media.not_kept({ why: text.author.unreachable })));
     request.send(file);
   });
 }

@@ -24,19 +24,19 @@ export class JsonPlace {
   }
 
   at(key: string): JsonPlace {
-    return this.find(key) ?? this.fail(mistakes.missing(key));
+    return this.find(key) ?? this.fail(mistakes.missing({ member: key }));
   }
 
   elements(most: number): JsonPlace[] {
     if (!Array.isArray(this.value_)) this.fail(mistakes.not_a_list);
-    if (this.value_.length > most) this.fail(mistakes.too_many(this.value_.length, most));
+    if (this.value_.length > most) this.fail(mistakes.too_many({ count: this.value_.length, most }));
     return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
   }
 
   members(most: number): [name: string, value: JsonPlace][] {
     if (typeof this.value_ !== 'object' || this.value_ === null) this.fail(mistakes.not_an_object);
     const members = Object.entries(this.value_);
-    if (members.length > most) this.fail(mistakes.too_many(members.length, most));
+    if (members.length > most) this.fail(mistakes.too_many({ count: members.length, most }));
     return members.map(([name, value]) => [name, new JsonPlace(`${this.place_}.${name}`, value)]);
   }
 
@@ -54,7 +54,7 @@ export class JsonPlace {
   number(low = -1e9, high = 1e9): number {
     const value = this.value_;
     if (typeof value !== 'number' || !(value >= low && value <= high)) {
-      this.fail(mistakes.not_in(low, high));
+      this.fail(mistakes.not_in({ low, high }));
     }
     return value;
   }
@@ -62,13 +62,13 @@ export class JsonPlace {
   /** A whole number that counts from 1, as an index. */
   ordinal(most: number): number {
     const value = this.number(1, most);
-    if (!Number.isInteger(value)) this.fail(mistakes.not_in(1, most));
+    if (!Number.isInteger(value)) this.fail(mistakes.not_in({ low: 1, high: most }));
     return value - 1;
   }
 
   numbers(count: number): number[] {
     const values = this.elements(count).map((value) => value.number());
-    if (values.length !== count) this.fail(mistakes.not_numbers(count));
+    if (values.length !== count) this.fail(mistakes.not_numbers({ count }));
     return values;
   }
 

@@ -94,7 +94,7 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
 export function read_supersplat(document: unknown, aspect: number): ImportedTours {
   const settings = new JsonPlace('settings.json', document);
   const version = settings.find('version')?.number();
-  if (version !== 2) settings.fail(mistakes.version(version ?? 1, 2));
+  if (version !== 2) settings.fail(mistakes.version({ found: String(version ?? 1), read: '2' }));
   const mode = settings.find('startMode')?.text() ?? 'default';
   const list = (key: string): JsonPlace[] => settings.find(key)?.elements(most_entries) ?? [];
 

@@ -110,7 +110,7 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
 
 /** For places without `look_at`. */
 const orientation_of = (place: JsonPlace): Quat =>
-  (place.find('orientation') ?? place.fail(text.mistakes.missing_both('look_at', 'orientation'))).orientation();
+  (place.find('orientation') ?? place.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))).orientation();
 
 function read_portal(portal: JsonPlace | undefined): Portal | undefined {
   if (!portal) return undefined;

@@ -2,7 +2,6 @@ import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
 import type { SceneListing } from '../session/scenes';
-import { number } from '../text/number';
 import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
@@ -177,7 +176,7 @@ export class AuthorPanel {
     const { edited } = this.draft_.state;
     const marker = await this.tools_.place_ahead();
     if (edited !== this.draft_.state.edited) return; // the author went on to another tour
-    const title = text.tour.stop_numbered(number(this.draft_.stops.length + 1));
+    const title = text.tour.stop_numbered({ n: this.draft_.stops.length + 1 });
     this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined, portal: undefined });
     this.edited(this.draft_.stops.length - 1);
     const added = by_id('author-stops', HTMLOListElement).lastElementChild;
@@ -227,7 +226,7 @@ export class AuthorPanel {
     this.language_.choose_all();
     this.edited(stop);
     const { src } = this.draft_.stops[stop]!.media![medium]!;
-    this.stops_.demand(`alt ${medium}`, text.author.not_described(number(stop + 1), src));
+    this.stops_.demand(`alt ${medium}`, text.author.not_described({ n: stop + 1, picture: src }));
     return true;
   }
 
@@ -255,7 +254,7 @@ export class AuthorPanel {
       this.theirs_ = result.tag;
       this.replace_.hidden = false;
       this.say(text.author.changed_meanwhile, this.done_);
-    } else this.say(text.author.not_saved(result.why), this.done_);
+    } else this.say(text.author.not_saved(result), this.done_);
     // A button that is disabled loses the focus.
     if (focused === this.save_ || focused === this.replace_) this.save_.focus();
   }
@@ -266,7 +265,7 @@ export class AuthorPanel {
     const name = `${this.tools_.file_name()}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
     this.saved_ = this.draft_.state;
-    this.say(this.token_ === undefined ? text.author.downloaded(name) : text.author.downloaded_too(name), this.done_);
+    this.say(this.token_ === undefined ? text.author.downloaded({ name }) : text.author.downloaded_too({ name }), this.done_);
   }
 
   private say(what: string, where = this.said_): void {
@@ -299,7 +298,7 @@ export class AuthorPanel {
     const { tour, editable, state } = this.draft_;
     const words = text.tour;
     this.tour_.replaceChildren(
-      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered(number(n + 1)), String(i))),
+      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered({ n: n + 1 }), String(i))),
     );
     this.tour_.value = String(state.edited);
     const { value: language } = this.language_;

@@ -95,17 +95,17 @@ export class AuthorStops {
     const behind = this.language_ === '' ? { title: '', caption: words.caption_here } : stop;
     const title = make('input', {
       ...{ value: written.title, maxLength: 200, placeholder: behind.title, ...in_its_own },
-      'aria-label': words.title(n),
+      'aria-label': words.title({ n }),
     });
     const caption = make('textarea', {
       ...{ value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own },
-      ...{ placeholder: behind.caption || words.caption_here, 'aria-label': words.caption(n) },
+      ...{ placeholder: behind.caption || words.caption_here, 'aria-label': words.caption({ n }) },
       title: words.markdown,
     });
     const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
       make('input', {
         ...{ type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual },
-        ...{ value: value === undefined ? '' : String(value), 'aria-label': words.of_stop(label, n) },
+        ...{ value: value === undefined ? '' : String(value), 'aria-label': words.of_stop({ field: label, n }) },
       });
     const stay = seconds(words.stay, stop.stay_s, String(Math.round(default_stay_s(stop))), longest_stay_s);
     const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);
@@ -135,7 +135,7 @@ export class AuthorStops {
     const known = options.find(({ name, id }) => now === name || now === id)?.name;
     const choice = make(
       'select',
-      { 'aria-label': words.of_stop(n) },
+      { 'aria-label': words.of_stop({ n }) },
       new Option(words.nowhere, ''),
       ...(now !== '' && known === undefined ? [new Option(now, now)] : []), // a scene that is not here
       ...options.map(({ name, label }) => new Option(label, name)),
@@ -169,9 +169,9 @@ export class AuthorStops {
       button('show', words.show, () => actions.go_to(i)),
       button('view', words.view_here, () => actions.take_view(i)),
       marker,
-      button('up', words.up(n), () => actions.move(i, -1), '↑', i === 0),
-      button('down', words.down(n), () => actions.move(i, 1), '↓', i === count - 1),
-      button('remove', words.remove(n), () => actions.remove(i), '×'),
+      button('up', words.up({ n }), () => actions.move(i, -1), '↑', i === 0),
+      button('down', words.down({ n }), () => actions.move(i, 1), '↓', i === count - 1),
+      button('remove', words.remove({ n }), () => actions.remove(i), '×'),
     );
   }
 

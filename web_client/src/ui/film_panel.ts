@@ -96,7 +96,7 @@ export class FilmPanel {
     const length_s = film_length_s(tour, this.tools_.reach());
     const most_s = most_film_frames / film_fps;
     if (length_s === 0) this.say(words.no_stops);
-    else if (length_s > most_s) this.say(words.too_long(duration(most_s), duration(length_s)));
+    else if (length_s > most_s) this.say(words.too_long({ most: duration(most_s), length: duration(length_s) }));
     else return film_eyes(tour, this.tools_.reach());
     return undefined;
   }
@@ -108,7 +108,7 @@ export class FilmPanel {
     save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
     const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
     const command = ['catgs-render', 'frames', '…', '--trace', file, '--fov-deg', fov_deg.toFixed(1), '--out', 'film.mp4'];
-    this.say(words.path_saved(command.join(' ')));
+    this.say(words.path_saved({ command: command.join(' ') }));
   }
 
   private async order(): Promise<void> {
@@ -123,7 +123,7 @@ export class FilmPanel {
     this.make_.disabled = true;
     const ordered = await order_film(location.href, token, this.tools_.scene_id(), { kind, size, views: write_views(eyes) });
     if ('id' in ordered) await this.watch(ordered.id, name);
-    else this.say(words.failed(ordered.why || text.author.unreachable));
+    else this.say(words.failed({ why: ordered.why || text.author.unreachable }));
     this.make_.disabled = false;
   }
 
@@ -135,7 +135,7 @@ export class FilmPanel {
     for (let wait_ms = look_again_ms; ; ) {
       const now = await film_state(location.href, id);
       if (now) this.show(now.state, now.share, now.seconds_left);
-      if (now?.state === 'failed') this.say(words.failed(now.error ?? ''));
+      if (now?.state === 'failed') this.say(words.failed({ why: now.error ?? '' }));
       if (now?.state === 'cancelled') this.say(words.cancelled);
       if (now?.state === 'done') {
         Object.assign(this.save_, { href: film_address(location.href, id), download: name, hidden: false });
@@ -156,6 +156,6 @@ export class FilmPanel {
         ? words.waiting
         : seconds_left === undefined
           ? words.drawing
-          : words.drawn(number(share, { style: 'percent' }), duration(seconds_left));
+          : words.drawn({ share: number(share, { style: 'percent' }), time: duration(seconds_left) });
   }
 }

@@ -192,7 +192,7 @@ export class Guide {
     const { tours, start, problems } = read_document(document, camera.up, camera.fov_y_rad, aspect);
     await this.doors_.learn(tours);
     if (load !== this.loads_) return;
-    for (const problem of problems) notice.show(text.tour.unreadable(problem));
+    for (const problem of problems) notice.show(text.tour.unreadable({ why: problem }));
     if (start) {
       camera.start_at(start);
       if (!shared.eye && !navigation.led) navigation.reset();

@@ -65,7 +65,7 @@ export class Hotspots {
       // It is hidden until it is placed.
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
       button.classList.toggle('door', door !== undefined);
-      button.append(label_of(stop, i, button, door && text.portals.to(door.title)));
+      button.append(label_of(stop, i, button, door && text.portals.to({ scene: door.title })));
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {
@@ -83,7 +83,7 @@ export class Hotspots {
 
 /** Where it leads or its title, and its caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
 function label_of(stop: Stop, index: number, button: HTMLButtonElement, leads_to: string | undefined): HTMLElement {
-  const title = leads_to ?? (stop.title || text.tour.stop_numbered(number(index + 1)));
+  const title = leads_to ?? (stop.title || text.tour.stop_numbered({ n: index + 1 }));
   const lang = stop.title && !leads_to ? stop.language : language;
   const label = make('span', { className: 'hotspot-label', dir: 'auto', lang }, make('span', { className: 'hotspot-name' }, title));
   if (stop.caption) {

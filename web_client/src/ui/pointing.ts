@@ -37,7 +37,7 @@ export class Pointing {
     private readonly notice_: Notice,
     seen: SeenCamera,
   ) {
-    worker_.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader(name) : words.by_other));
+    worker_.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader({ name }) : words.by_other));
     worker_.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
     seen.moved.listen((eye) => this.see(eye));
     on_click('company-point', () => void this.point_at(0.5, 0.5));

@@ -7,7 +7,7 @@ import { by_id, make } from './dom';
 /** Shows the name of the scene and whom it is from. `several`: this visitor may see other scenes, too. */
 export function show_scene_title(scene: SceneFacts, several: boolean): void {
   const name = scene.title || scene.sceneId;
-  const count = text.scene.gaussians(number(scene.gaussians));
+  const count = text.scene.gaussians({ count: number(scene.gaussians) });
   const what = scene.model === '' ? count : `${count}, ${scene.model}`;
   by_id('scene-name', HTMLElement).replaceChildren(make('bdi', {}, name), make('small', {}, what));
   by_id('scene-credits', HTMLElement).textContent = credit_line(scene);

@@ -5,7 +5,7 @@ import { sum } from '../base/time_window';
 import type { StatsHistory } from '../stats/history';
 import { stages, type Stage, type StatsSnapshot } from '../stats/metrics';
 import { number } from '../text/number';
-import { text } from '../text/text';
+import { operator } from '../text/operator';
 import { make } from './dom';
 
 /** For both light and dark pages. */
@@ -48,7 +48,7 @@ const time_axis = (host: Element): uPlot.Axis =>
     size: 18,
     gap: 2,
     labelSize: 0,
-    values: (_, ticks) => ticks.map((s) => `${number(s)} ${text.units.seconds}`),
+    values: (_, ticks) => ticks.map((s) => `${number(s)} ${operator.units.seconds}`),
   });
 
 const line = (label: string, stroke: string, scale: string): uPlot.Series => ({
@@ -91,9 +91,9 @@ export class StatsCharts {
         sum(stages.slice(0, stages.indexOf(last) + 1).map((stage) => stages_ms[stage]).filter(Number.isFinite));
     return {
       plot: this.plot(
-        text.plots.latency,
-        drawn.map((stage) => ({ ...line(text.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
-        [axis(this.host_, text.units.milliseconds)],
+        operator.plots.latency,
+        drawn.map((stage) => ({ ...line(operator.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
+        [axis(this.host_, operator.units.milliseconds)],
       ),
       data: (history) => drawn.map((stage) => history.column(up_to(stage))),
     };
@@ -103,9 +103,9 @@ export class StatsCharts {
   private rates(): Chart {
     return {
       plot: this.plot(
-        text.plots.rates,
-        [line(text.plots.fps, '#4b7bd6', 'y'), line(text.plots.bitrate, '#e07a3f', 'bits')],
-        [axis(this.host_, text.units.fps), axis(this.host_, text.units.megabits, { side: 1, scale: 'bits', grid: { show: false } })],
+        operator.plots.rates,
+        [line(operator.plots.fps, '#4b7bd6', 'y'), line(operator.plots.bitrate, '#e07a3f', 'bits')],
+        [axis(this.host_, operator.units.fps), axis(this.host_, operator.units.megabits, { side: 1, scale: 'bits', grid: { show: false } })],
       ),
       data: (history) => [history.column((s) => s.fps_shown), history.column((s) => s.bitrate_kbps / 1000)],
     };

@@ -4,7 +4,6 @@ import { Signal } from '../base/signal';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, pursuit } from '../camera/flight';
 import { watch_token } from '../session/token';
-import { number } from '../text/number';
 import { text } from '../text/text';
 import { presentation_address } from '../tour/share';
 import { Lead_State, type Lead, type Welcome } from '../wire/wire';
@@ -116,7 +115,7 @@ export class Together {
 
   /** The leader is in another scene. Begins anew there, or watches where the visitor may not go. */
   private go_along(): void {
-    this.notice_.show(words.goes_on(this.lead_?.name || words.somebody), 10);
+    this.notice_.show(words.goes_on({ name: this.lead_?.name || words.somebody }), 10);
     this.become('left'); // it comes to follow by the next message
     this.navigation_.stop_flight();
     this.worker_.post({ kind: 'watch', watch: this.token_ });
@@ -221,19 +220,19 @@ export class Together {
     const name = this.lead_?.name || words.somebody;
     const count = this.lead_?.company ?? 0;
     const away = this.lead_?.state === Lead_State.AWAY;
-    const leads = count > 1 ? words.leads_several(name, count, number(count)) : words.leads(name);
+    const leads = count > 1 ? words.leads_several({ name, count }) : words.leads({ name });
     const said: Readonly<Record<Role, string>> = {
       alone: '',
-      watching: this.leader_gone_ ? '' : away ? words.away(name) : leads,
-      following: away ? words.away(name) : leads,
+      watching: this.leader_gone_ ? '' : away ? words.away({ name }) : leads,
+      following: away ? words.away({ name }) : leads,
       left: '', // nobody tells those who left whether the leader still leads
-      leading: words.you_lead(count, number(count)),
+      leading: words.you_lead({ count }),
     };
     const action: Readonly<Record<Role, string>> = {
       alone: '',
       watching: this.may_leave_ ? words.leave : '',
       following: words.leave,
-      left: this.lead_?.name ? words.follow(name) : words.follow_somebody,
+      left: this.lead_?.name ? words.follow({ name }) : words.follow_somebody,
       leading: words.stop,
     };
     this.pointing_.allowed = this.role_ === 'leading' || (this.role_ === 'following' && this.lead_?.mayPing === true);
@@ -242,7 +241,7 @@ export class Together {
     this.bar_.hidden = said[this.role_] === '' && action[this.role_] === '';
     this.action_.textContent = action[this.role_];
     this.action_.hidden = action[this.role_] === '';
-    this.view_.setAttribute('aria-label', this.role_ === 'watching' ? words.view(name) : this.own_label_);
+    this.view_.setAttribute('aria-label', this.role_ === 'watching' ? words.view({ name }) : this.own_label_);
   }
 }
 

@@ -1,6 +1,5 @@
 import { CaptionView, prepare } from '../captions/caption';
 import { is_for_page } from '../input/view_input';
-import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
@@ -49,7 +48,7 @@ export class TourView {
     this.card_.hidden = !this.has_tours_;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
-      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered(number(i + 1)), String(i))),
+      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered({ n: i + 1 }), String(i))),
     );
   }
 
@@ -66,7 +65,7 @@ export class TourView {
     this.text_.scrollTop = 0;
     this.show_portal(stop);
     by_id('tour-place', HTMLElement).textContent =
-      count === 0 ? '' : stop_index === undefined ? text.tour.stops(count, number(count)) : text.tour.place(number(stop_index + 1), number(count));
+      count === 0 ? '' : stop_index === undefined ? text.tour.stops({ count }) : text.tour.place({ n: stop_index + 1, count });
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }
@@ -82,9 +81,9 @@ export class TourView {
     const is_closed = door !== undefined && door.scene_id === undefined;
     this.portal_.hidden = door === undefined;
     this.portal_.disabled = is_closed;
-    by_id('tour-portal-text', HTMLElement).textContent = door ? text.portals.to(door.title) : '';
+    by_id('tour-portal-text', HTMLElement).textContent = door ? text.portals.to({ scene: door.title }) : '';
     const closed = by_id('tour-closed', HTMLElement);
     closed.hidden = !is_closed;
-    closed.textContent = is_closed ? text.portals.closed(door.title) : '';
+    closed.textContent = is_closed ? text.portals.closed({ scene: door.title }) : '';
   }
 }

@@ -9,6 +9,7 @@ import { device_kind } from '../session/device';
 import { TourMedia, TourMediaFields } from '../media/tour_media';
 import { watch_token, type AccessToken } from '../session/token';
 import { factor } from '../text/number';
+import { operator } from '../text/operator';
 import { text } from '../text/text';
 import { WorkerClient } from '../worker/client';
 import { make_automation } from './automation';
@@ -73,14 +74,14 @@ export function mount_viewer(card: CardView, token: AccessToken, scene_id: strin
   });
   const poster = new Poster();
   worker.on('presented', () => poster.end());
-  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now(factor(speed)), 2));
+  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now({ factor: factor(speed) }), 2));
   worker.on('notice', ({ message }) => notice.show(message, 20));
   // Visitors hear what it means to them, and the console has the reason.
   const tell_of_jpeg = (why: string): void => {
     console.warn(why);
     notice.show(text.jpeg.slower, 20);
   };
-  worker.on('fallback', ({ message }) => tell_of_jpeg(text.jpeg.failed_now(message)));
+  worker.on('fallback', ({ message }) => tell_of_jpeg(operator.jpeg.failed_now({ why: message })));
   worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
 
   if (scene_id) void poster.show(location.href, scene_id, token.value);

@@ -2,11 +2,13 @@
 import type { DecoderRung } from '../decode/ladder';
 import type { SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
-import { duration, list, number } from '../text/number';
+import { duration, list } from '../text/number';
+import { operator } from '../text/operator';
 import { text } from '../text/text';
 import { Error_Code } from '../wire/wire';
 
 const { cards, actions } = text;
+const { jpeg } = operator;
 
 export interface Card {
   readonly title: string;
@@ -43,11 +45,11 @@ export function card_for(
       const time = duration(state.estimate_s);
       const { loading_scene, queue } = cards;
       return state.for_scene
-        ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time(time), busy: true }
+        ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time({ time }), busy: true }
         : {
-            title: queue.title(number(state.position)),
+            title: queue.title({ position: state.position }),
             text: queue.text,
-            time: queue.time(time),
+            time: queue.time({ time }),
             busy: true,
             action: { label: actions.call, does: 'call' },
           };
@@ -59,7 +61,7 @@ export function card_for(
       return {
         title: cards.waiting[state.cause],
         text: sentence(state.message).trim(),
-        time: cards.trying_again(duration(state.retry_in_ms / 1000)),
+        time: cards.trying_again({ time: duration(state.retry_in_ms / 1000) }),
         busy: true,
         action: { label: actions.now, does: 'retry' },
       };
@@ -104,7 +106,7 @@ function unknown_scene_card(message: string, scenes: readonly SceneListing[]): C
     title,
     text: sentence(message) + check,
     action: {
-      label: first === undefined ? actions.open_first : actions.open(first.title),
+      label: first === undefined ? actions.open_first : actions.open({ scene_id: first.title }),
       does: 'open',
       scene_id: first?.id ?? '',
     },
@@ -127,7 +129,7 @@ export function unsupported_card(
   const lacking = (['Worker', 'OffscreenCanvas', 'WebSocket'] as const).filter((f) => !scope[f]);
   if (lacking.length === 0) return undefined;
   const { title, text } = cards.unsupported;
-  return { title, text: text(list(lacking)) };
+  return { title, text: text({ lacking: list(lacking) }) };
 }
 
 /** Says why pictures come as JPEG and not as video; undefined when they come as video. */
@@ -136,8 +138,8 @@ export function jpeg_reason(
   is_secure: boolean,
   rung: DecoderRung,
 ): string | undefined {
-  if (has_webcodecs) return rung === 'jpeg' ? text.jpeg.failed_lately : undefined;
-  return is_secure ? text.jpeg.no_decoder : text.jpeg.not_secure;
+  if (has_webcodecs) return rung === 'jpeg' ? jpeg.failed_lately : undefined;
+  return is_secure ? jpeg.no_decoder : jpeg.not_secure;
 }
 
 function sentence(said: string): string {
