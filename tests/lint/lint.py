@@ -58,9 +58,8 @@ LAYERS = {name: rank for rank, line in enumerate([
     "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour web_client/src/walk",
     "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film",
-    "web_client/src/ui", "web_client/src/media web_client/src/ground",
-    "web_client/src/ui/viewer",
-    "web_client/src/main",
+    "web_client/src/page", "web_client/src/author", "web_client/src/ui", "web_client/src/media web_client/src/ground",
+    "web_client/src",
 ]) for name in line.split()}
 LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!\w+/generated/)")
 
@@ -88,7 +87,7 @@ INCLUDE_RULES = [
 IMPORT_RULES = [
     IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|wire/generated/",
                 "src/wire alone speaks protobuf"),
-    IncludeRule(r"^web_client/src/ui/", r"^\.\./(transport/|worker/worker$|session/session$)",
+    IncludeRule(r"^web_client/src/(page|author|ui|media|ground)/", r"^\.\./(transport/|worker/worker$|session/session$)",
                 "the page speaks to the worker through worker/client"),
 ]
 
@@ -122,6 +121,7 @@ BANNED_CALLS = [
 ]
 
 MAX_LINES = 450
+MAX_IMPORTS = 20  # modules of the project that a TypeScript file imports
 
 # Pages whose tables name constants of the sources, and tests.
 SECURITY_PAGES = ("deploy/SECURITY.md", "deploy/FAULTS.md", "deploy/LIMITS.md")
@@ -176,6 +176,10 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
     if re.search(r"(?<!-inl)\.(h|cuh)$", path) and "#pragma once" not in lines:
         yield f"{path}:1: no #pragma once"
     pattern, rules = (IMPORT, IMPORT_RULES) if path.endswith(".ts") else (INCLUDE, INCLUDE_RULES)
+    if path.startswith("web_client/src/"):
+        imported = {found.group(1) for line in lines if (found := pattern.search(line))}
+        if len(imported) > MAX_IMPORTS:
+            yield f"{path}:1: imports {len(imported)} modules, the limit is {MAX_IMPORTS}: split the file"
     rules = [rule for rule in rules if re.search(rule.where, path)]
     banned = [call for call in BANNED_CALLS if re.search(call.where, path)]
     for number, line in enumerate(lines, start=1):

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { rotate, type Vec3 } from '#client/base/vector';
-import { address_in, address_led_to, arrival, door_of, lasting_name } from '#client/portals/portals';
+import { address_in, address_led_to, arrival, lasting_name, target_of } from '#client/portals/portals';
 import { read_tours, write_tours, type Portal } from '#client/tour/tour';
 import { expect_vec } from './cameras';
 
@@ -36,11 +36,11 @@ describe('a portal', () => {
   });
 
   it('leads to the scene of its id, or to the only one of its name', () => {
-    expect(door_of(portal({ scene: 'hall' }), scenes)).toEqual({ scene_id: 'hall-kdfmqrtv', title: 'The hall' });
-    expect(door_of(portal({ scene: 'hall-kdfmqrtv' }), scenes).scene_id).toBe('hall-kdfmqrtv');
-    expect(door_of(portal({ scene: 'town' }), scenes).scene_id).toBe('town');
+    expect(target_of(portal({ scene: 'hall' }), scenes)).toEqual({ scene_id: 'hall-kdfmqrtv', title: 'The hall' });
+    expect(target_of(portal({ scene: 'hall-kdfmqrtv' }), scenes).scene_id).toBe('hall-kdfmqrtv');
+    expect(target_of(portal({ scene: 'town' }), scenes).scene_id).toBe('town');
     for (const scene of ['attic', 'castle', 'hall-bcdfghjk']) {
-      expect(door_of(portal({ scene }), scenes)).toEqual({ scene_id: undefined, title: scene });
+      expect(target_of(portal({ scene }), scenes)).toEqual({ scene_id: undefined, title: scene });
     }
     expect(lasting_name('hall-kdfmqrtv', scenes)).toBe('hall');
     expect(lasting_name('attic-bcdfghjk', scenes)).toBe('attic-bcdfghjk');

@@ -3,7 +3,7 @@ import { Signal } from '../base/signal';
 import { add, forward, rotate, scale } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
-import type { Navigation } from '../ui/navigation';
+import type { Navigation } from '../page/navigation';
 import { ceiling_cut, dollhouse_eye } from '../walk/dollhouse';
 import { floor_along } from '../walk/floor';
 import type { Block, Stand, WalkMap } from '../walk/walk_map';

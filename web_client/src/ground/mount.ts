@@ -4,20 +4,17 @@ import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/view_input';
+import { by_id } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
 import type { TourState } from '../tour/player';
-import { by_id } from '../ui/dom';
-import type { PageParts } from '../ui/guide';
-import type { Notice } from '../ui/notice';
 import type { Stand, WalkMap } from '../walk/walk_map';
-import type { PlanPanel } from './plan_panel';
 import type { Dollhouse } from './dollhouse';
+import type { PlanPanel } from './plan_panel';
 import { SceneGround } from './scene_ground';
 import type { Walking } from './walking';
 
 interface GroundParts extends PageParts {
-  readonly notice: Notice;
-  readonly storage: Storage | undefined;
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
 }

@@ -1,10 +1,10 @@
 // The floor plan: a small map that follows the visitor, or the whole storey.
 import { dot, forward, length, rotate, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { by_id, icon, make } from '../page/dom';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import type { Stop } from '../tour/tour';
-import { by_id, icon, make } from '../ui/dom';
 import { clear_near } from '../walk/map_walker';
 import { height_of } from '../walk/tiles';
 import { cells_per_eye_height, places_at, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';

@@ -1,10 +1,10 @@
 // Leads a walking visitor to where they point on the floor, and shows where that is.
 import type { Timers, Clock } from '../base/clock';
 import { add, dot, forward, length, look_at, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
-import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import type { Eye } from '../camera/eye';
+import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import { place_of } from '../camera/ray';
-import type { Navigation } from '../ui/navigation';
+import type { Navigation } from '../page/navigation';
 import { floor_along } from '../walk/floor';
 import { MapWalker } from '../walk/map_walker';
 import { find_path } from '../walk/path';

@@ -1,6 +1,6 @@
 // Lengths and areas as visitors write them.
-import { locale } from '../text/text';
 import { number } from '../text/number';
+import { locale } from '../text/text';
 import type { Measured } from './measurement';
 
 export const systems = ['metric', 'imperial'] as const;

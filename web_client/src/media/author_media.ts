@@ -1,15 +1,15 @@
 // The author's fields for pictures, films, voices and sounds.
+import type { MediaFields } from '../author/stops';
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import { max_media, max_text_characters } from '../tour/limits';
 import { accepted, kind_of, media_kinds, usual_volume, type MediaKind, type Medium } from '../tour/media';
 import type { Stop, Tour } from '../tour/tour';
-import type { MediaFields } from '../ui/author_stops';
-import { by_id, make } from '../ui/dom';
 import { MediaShelf } from './shelf';
 
 interface Choice {
   readonly label: string;
-  readonly control: string; // by which the focus finds it again (author_stops.ts)
+  readonly control: string; // by which the focus finds it again (author/stops.ts)
   readonly kinds: readonly (MediaKind | 'captions')[];
   /** The file that is chosen; '': none. */
   readonly value: string;

@@ -1,6 +1,6 @@
+import { make } from '../page/dom';
 import { text } from '../text/text';
 import type { Medium } from '../tour/media';
-import { make } from '../ui/dom';
 
 /** Shows a picture in the whole window, until the visitor closes it. */
 export function show_large(address: string, { alt, language }: Medium): void {

@@ -1,9 +1,9 @@
 // Shows and plays the media of tours. The page loads it when a tour has some.
 import { browser_storage } from '../base/browser_storage';
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { by_id, make } from '../ui/dom';
 import { MediaAddresses } from './addresses';
 import { Narrator } from './narrator';
 import { Sounds } from './sounds';
@@ -21,10 +21,10 @@ export class MediaPart {
   private stop_: Stop | undefined;
   private playing_ = false;
 
-  /** `pause`: of the tour. */
+  /** `enlarged`: as in TourMedia. */
   constructor(
     private readonly token_: () => string,
-    pause: () => void,
+    enlarged: () => void,
   ) {
     this.addresses_ = new MediaAddresses(location.href, '', '');
     const voice = make('audio', { preload: 'auto' });
@@ -34,7 +34,7 @@ export class MediaPart {
       changed: () => this.update(),
     });
     this.narrator_ = new Narrator(voice, this.sounds_);
-    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing), enlarged: pause });
+    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing), enlarged });
     by_id('tour', HTMLElement).append(voice);
     this.button_.addEventListener('click', () => this.sounds_.toggle());
     for (const gesture of ['pointerup', 'keydown', 'click'] as const) {

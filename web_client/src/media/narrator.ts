@@ -1,7 +1,7 @@
 // The voice of a stop in the card of the tour: its button, and its words as text.
+import { by_id, icon, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Narration } from '../tour/media';
-import { by_id, icon, make } from '../ui/dom';
 import type { MediaAddresses } from './addresses';
 import type { Sounds } from './sounds';
 import { captions_track } from './stop_media';

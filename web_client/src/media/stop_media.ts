@@ -1,7 +1,7 @@
 // The pictures, films and sounds of a stop, in the card of the tour.
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Medium } from '../tour/media';
-import { by_id, make } from '../ui/dom';
 import type { MediaAddresses } from './addresses';
 import { show_large } from './large_picture';
 

@@ -5,14 +5,14 @@ import { watch_token } from '../session/token';
 import { share_address, type SharedView } from '../tour/share';
 import type { Portal } from '../tour/tour';
 
-/** What is behind a portal for this visitor. Without an id it is closed. */
-export interface Door {
+/** Where a portal leads for this visitor. Without an id it is closed. */
+export interface PortalTarget {
   readonly scene_id: string | undefined;
   readonly title: string;
 }
 
 /** `scenes`: those that this visitor may see. A name counts where only one of them has it. */
-export function door_of({ scene }: Portal, scenes: readonly SceneListing[]): Door {
+export function target_of({ scene }: Portal, scenes: readonly SceneListing[]): PortalTarget {
   const named = scenes.filter(({ id }) => scene_name(id) === scene);
   const found = scenes.find(({ id }) => id === scene) ?? (named.length === 1 ? named[0] : undefined);
   return { scene_id: found?.id, title: found?.title || scene };

@@ -43,6 +43,9 @@ export function scene_name(scene_id: string): string {
   return scene_id.replace(/^(.+)-[b-df-hjkmnp-tv]{8}$/, '$1');
 }
 
+/** Name for files of the scene, without extension. */
+export const file_name_of = (scene_id: string): string => scene_name(scene_id) || 'scene';
+
 /** Whom a scene is from, and under which licence; '' where nothing is said. */
 export const credit_line = ({ credits, licence }: Pick<SceneListing, 'credits' | 'licence'>): string =>
   [credits, licence].filter((words) => words).join(' · ');

@@ -1,6 +1,6 @@
 // What an author is editing: the tours and what the scene's sidecar says besides. Pure.
-import type { CameraMode } from '../camera/mode';
 import type { Eye } from '../camera/eye';
+import type { CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 import { untranslated } from './words';

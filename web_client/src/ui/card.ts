@@ -1,6 +1,6 @@
 import { Signal } from '../base/signal';
+import { by_id, make } from '../page/dom';
 import { scene_address, scene_labels, type SceneListing } from '../session/scenes';
-import { by_id, make } from './dom';
 import type { Card } from './wording';
 
 /** The card over the picture: what is going on while no picture says it. */

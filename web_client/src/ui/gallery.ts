@@ -1,7 +1,7 @@
 // The first page of a server with several scenes: a picture of each.
+import { by_id, make } from '../page/dom';
 import { credit_line, fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
-import { by_id, make } from './dom';
 
 const next_try_ms = 5000;
 const tries = 60; // five minutes: a scene that is not loaded by then has more important visitors before it

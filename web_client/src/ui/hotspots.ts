@@ -1,13 +1,13 @@
-import { caption_words } from '../captions/caption';
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
+import { caption_words } from '../captions/caption';
+import { by_id, icon, make } from '../page/dom';
+import type { SeenCamera } from '../page/seen_camera';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { by_id, icon, make } from './dom';
-import type { Doors } from './doors';
-import type { SeenCamera } from './seen_camera';
+import type { PortalScenes } from './portal_scenes';
 
 /** Shows the stops of a tour as buttons in the picture. */
 export class Hotspots {
@@ -19,7 +19,7 @@ export class Hotspots {
   constructor(
     private readonly view_: HTMLElement,
     seen: SeenCamera,
-    private readonly doors_: Doors,
+    private readonly scenes_: PortalScenes,
     private readonly go_to_: (stop_index: number) => void,
   ) {
     window.addEventListener('keydown', ({ code }) => {
@@ -60,12 +60,12 @@ export class Hotspots {
     this.tour_ = tour;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
-      const door = stop.portal && this.doors_.behind(stop.portal);
-      const sign = door ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
+      const target = stop.portal && this.scenes_.target_of(stop.portal);
+      const sign = target ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
       // It is hidden until it is placed.
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
-      button.classList.toggle('door', door !== undefined);
-      button.append(label_of(stop, i, button, door && text.portals.to({ scene: door.title })));
+      button.classList.toggle('portal', target !== undefined);
+      button.append(label_of(stop, i, button, target && text.portals.to({ scene: target.title })));
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {

@@ -3,22 +3,15 @@ import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
 import { area_of, length_of, rise_of, type Mark } from '../measure/measurement';
 import { system_here, systems, written, type Scale, type System } from '../measure/units';
+import { by_id, make, on_click } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
-import { by_id, make, on_click } from './dom';
-import type { Navigation } from './navigation';
-import type { SeenCamera } from './seen_camera';
-import type { Toolbar } from './toolbar';
 
 const most_marks = 100;
 const system_key = 'catgs.units';
 const svg = 'http://www.w3.org/2000/svg';
 
-interface MeasureParts {
-  readonly view: HTMLElement;
-  readonly navigation: Navigation;
-  readonly toolbar: Toolbar;
-  readonly seen: SeenCamera;
-  readonly storage: Storage | undefined;
+interface MeasureParts extends PageParts {
   /** Of authors: the scene has this scale from now on. */
   readonly set_scale: ((metres_per_unit: number) => void) | undefined;
 }

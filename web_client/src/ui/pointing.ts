@@ -2,12 +2,9 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { direction_to, place_of } from '../camera/ray';
+import { by_id, make, on_click } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
-import type { WorkerClient } from '../worker/client';
-import { by_id, make, on_click } from './dom';
-import type { Navigation } from './navigation';
-import type { Notice } from './notice';
-import type { SeenCamera } from './seen_camera';
 
 const { guide: words } = text;
 const long_press_ms = 600;
@@ -30,15 +27,10 @@ export class Pointing {
   private eye_: Eye | undefined; // of the picture that the visitor sees
   private picture_aspect_ = 0;
 
-  constructor(
-    private readonly view_: HTMLElement,
-    private readonly worker_: WorkerClient,
-    private readonly navigation_: Navigation,
-    private readonly notice_: Notice,
-    seen: SeenCamera,
-  ) {
-    worker_.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader({ name }) : words.by_other));
-    worker_.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
+  constructor(private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice' | 'seen'>) {
+    const { worker, seen } = parts_;
+    worker.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader({ name }) : words.by_other));
+    worker.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
     seen.moved.listen((eye) => this.see(eye));
     on_click('company-point', () => void this.point_at(0.5, 0.5));
     this.bind_presses();
@@ -53,7 +45,7 @@ export class Pointing {
 
   /** The camera of the leader's picture, which this visitor watches. It has its own shape, and is all in the view. */
   watch(eye: Eye): void {
-    const { clientWidth, clientHeight } = this.view_;
+    const { clientWidth, clientHeight } = this.parts_.view;
     const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
     this.see({ ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) });
   }
@@ -64,7 +56,7 @@ export class Pointing {
   }
 
   private bind_presses(): void {
-    const { view_: view } = this;
+    const { view } = this.parts_;
     const capture = { capture: true };
     view.addEventListener(
       'pointerdown',
@@ -106,14 +98,14 @@ export class Pointing {
   }
 
   private share_of(x: number, y: number): [number, number] {
-    const { left, top, width, height } = this.view_.getBoundingClientRect();
+    const { left, top, width, height } = this.parts_.view.getBoundingClientRect();
     return [(x - left) / width, (y - top) / height];
   }
 
   private async point_at(x: number, y: number): Promise<void> {
-    const mark = await this.navigation_.hit_at(x, y);
-    if (mark) this.worker_.post({ kind: 'ping', place: mark.point });
-    else this.notice_.show(words.nothing_there, 4);
+    const mark = await this.parts_.navigation.hit_at(x, y);
+    if (mark) this.parts_.worker.post({ kind: 'ping', place: mark.point });
+    else this.parts_.notice.show(words.nothing_there, 4);
   }
 
   private show(place: Vec3, said: string): void {
@@ -123,7 +115,7 @@ export class Pointing {
     for (const { ring: old } of this.shown_.slice(0, -most_shown)) old.remove();
     this.shown_ = this.shown_.slice(-most_shown);
     this.host_.append(ring);
-    const inside = this.put(shown, this.eye_ ?? this.navigation_.eye);
+    const inside = this.put(shown, this.eye_ ?? this.parts_.navigation.eye);
     // The ring tells all others.
     by_id('company-said', HTMLElement).textContent = inside ? said : `${said}. ${words.aside}`;
     setTimeout(() => {
@@ -135,7 +127,7 @@ export class Pointing {
 
   /** Puts the ring where the place is, or an arrow at the edge. Returns whether the place is in the picture. */
   private put({ place, ring }: Shown, eye: Eye): boolean {
-    const { clientWidth: width_px, clientHeight: height_px } = this.view_;
+    const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
     const at = place_of(place, eye, width_px / height_px);
     const inside = at !== undefined && at.every((share) => share > 0 && share < 1);
     ring.classList.toggle('aside', !inside);

@@ -1,10 +1,10 @@
+import { by_id, on_click } from '../page/dom';
+import type { Navigation } from '../page/navigation';
 import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
 import { factor, number } from '../text/number';
 import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
-import { by_id, on_click } from './dom';
-import type { Navigation } from './navigation';
 import type { StreamSize } from './stream_size';
 
 const degrees = 180 / Math.PI;

@@ -1,8 +1,8 @@
+import { by_id, make } from '../page/dom';
 import { credit_line, scene_address } from '../session/scenes';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import type { SceneFacts } from '../wire/wire';
-import { by_id, make } from './dom';
 
 /** Shows the name of the scene and whom it is from. `several`: this visitor may see other scenes, too. */
 export function show_scene_title(scene: SceneFacts, several: boolean): void {

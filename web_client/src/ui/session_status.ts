@@ -1,10 +1,10 @@
+import type { Toolbar } from '../page/toolbar';
 import { list_scenes, type SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import type { AccessToken } from '../session/token';
 import { Error_Code } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
-import type { Toolbar } from './toolbar';
 import { broken_card, card_for } from './wording';
 
 const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards

@@ -2,11 +2,11 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import { sum } from '../base/time_window';
+import { make } from '../page/dom';
 import type { StatsHistory } from '../stats/history';
 import { stages, type Stage, type StatsSnapshot } from '../stats/metrics';
 import { number } from '../text/number';
 import { operator } from '../text/operator';
-import { make } from './dom';
 
 /** For both light and dark pages. */
 const colours: Readonly<Record<Stage, string>> = {

@@ -1,13 +1,13 @@
+import { by_id, make, save_file } from '../page/dom';
+import type { Toolbar } from '../page/toolbar';
 import type { Sides } from '../present/warp';
 import { StatsHistory } from '../stats/history';
 import type { StatsReport } from '../stats/metrics';
 import { number } from '../text/number';
 import { operator } from '../text/operator';
 import type { WorkerClient } from '../worker/client';
-import { by_id, make, save_file } from './dom';
 import type { StatsCharts } from './stats_charts';
 import { rest_note, row_texts, slowest_stage, stats_rows } from './stats_rows';
-import type { Toolbar } from './toolbar';
 
 const interval_ms = 250;
 

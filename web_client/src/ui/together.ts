@@ -3,16 +3,13 @@
 import { Signal } from '../base/signal';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, pursuit } from '../camera/flight';
+import { by_id, on_click } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { watch_token } from '../session/token';
 import { text } from '../text/text';
 import { presentation_address } from '../tour/share';
 import { Lead_State, type Lead, type Welcome } from '../wire/wire';
-import type { WorkerClient } from '../worker/client';
-import { by_id, on_click } from './dom';
-import type { Navigation } from './navigation';
-import type { Notice } from './notice';
 import type { Pointing } from './pointing';
-import type { Toolbar } from './toolbar';
 
 const { together: words } = text;
 const most_name_bytes = 64; // that the wire takes
@@ -45,30 +42,27 @@ export class Together {
   private readonly places_ = by_id('present-places', HTMLInputElement);
 
   constructor(
-    private readonly worker_: WorkerClient,
-    private readonly navigation_: Navigation,
-    private readonly toolbar_: Toolbar,
-    private readonly notice_: Notice,
+    private readonly parts_: Pick<PageParts, 'worker' | 'navigation' | 'toolbar' | 'notice' | 'reduced_motion'>,
     private readonly pointing_: Pointing,
-    private readonly reduced_motion_: boolean,
   ) {
-    navigation_.led = this.token_ !== '';
-    worker_.on('welcome', ({ welcome }) => this.welcomed(welcome));
-    worker_.on('state', ({ state }) => {
+    const { worker, navigation } = parts_;
+    navigation.led = this.token_ !== '';
+    worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
+    worker.on('state', ({ state }) => {
       this.leader_gone_ = state.phase === 'waiting' && state.cause === 'no_leader';
       this.show();
     });
-    worker_.on('lead', ({ lead, eye }) => this.heard(lead, eye));
-    worker_.on('presented', ({ pose, fov_y_rad }) => {
+    worker.on('lead', ({ lead, eye }) => this.heard(lead, eye));
+    worker.on('presented', ({ pose, fov_y_rad }) => {
       if (this.role_ !== 'watching') return;
       this.leader_eye_ = { ...pose, fov_y_rad };
       pointing_.watch(this.leader_eye_);
     });
-    navigation_.entered.listen(() => {
+    navigation.entered.listen(() => {
       // Who watched goes on from the leader's view.
-      if (this.role_ === 'watching' && this.leader_eye_) navigation_.put(this.leader_eye_);
+      if (this.role_ === 'watching' && this.leader_eye_) navigation.put(this.leader_eye_);
     });
-    navigation_.taken_over.listen(() => {
+    navigation.taken_over.listen(() => {
       if (this.role_ === 'following') this.leave();
     });
     this.action_.addEventListener('click', () => this.act());
@@ -107,26 +101,26 @@ export class Together {
   /** Whoever presents again does not fetch the visitor back. */
   private ended(): void {
     this.wants_ = false;
-    this.worker_.post({ kind: 'follow', watch: '' });
-    if (this.role_ === 'following') this.notice_.show(words.over, 10);
+    this.parts_.worker.post({ kind: 'follow', watch: '' });
+    if (this.role_ === 'following') this.parts_.notice.show(words.over, 10);
     this.become(this.role_ === 'following' ? 'alone' : 'left'); // who asks too early may ask again
-    this.navigation_.stop_flight();
+    this.parts_.navigation.stop_flight();
   }
 
   /** The leader is in another scene. Begins anew there, or watches where the visitor may not go. */
   private go_along(): void {
-    this.notice_.show(words.goes_on({ name: this.lead_?.name || words.somebody }), 10);
+    this.parts_.notice.show(words.goes_on({ name: this.lead_?.name || words.somebody }), 10);
     this.become('left'); // it comes to follow by the next message
-    this.navigation_.stop_flight();
-    this.worker_.post({ kind: 'watch', watch: this.token_ });
+    this.parts_.navigation.stop_flight();
+    this.parts_.worker.post({ kind: 'watch', watch: this.token_ });
   }
 
   private follow(eye: Eye): void {
     if (this.role_ !== 'following') {
       this.become('following');
       this.joining_ = true;
-      const from = this.navigation_.eye;
-      const time_s = this.reduced_motion_ ? 0 : glide_time_s(from, eye, this.navigation_.reach);
+      const from = this.parts_.navigation.eye;
+      const time_s = this.parts_.reduced_motion ? 0 : glide_time_s(from, eye, this.parts_.navigation.reach);
       this.fly(glide(from, eye, time_s));
     } else if (!this.joining_) {
       this.chase();
@@ -134,13 +128,13 @@ export class Together {
   }
 
   private chase(): void {
-    const { leader_eye_: to, navigation_: navigation } = this;
-    if (to) this.fly(this.reduced_motion_ ? glide(to, to, 0) : pursuit(navigation.eye, to));
+    const { leader_eye_: to, parts_: { navigation } } = this;
+    if (to) this.fly(this.parts_.reduced_motion ? glide(to, to, 0) : pursuit(navigation.eye, to));
   }
 
   private fly(way: ReturnType<typeof glide>): void {
     this.chasing_ = true;
-    this.navigation_.fly(way, (arrived) => {
+    this.parts_.navigation.fly(way, (arrived) => {
       if (arrived && this.joining_) {
         this.joining_ = false;
         this.chase();
@@ -154,26 +148,26 @@ export class Together {
   private act(): void {
     if (this.role_ === 'leading') this.stop();
     else if (this.role_ === 'left') this.come_back();
-    else if (this.role_ === 'watching') this.worker_.post({ kind: 'watch', watch: '' });
+    else if (this.role_ === 'watching') this.parts_.worker.post({ kind: 'watch', watch: '' });
     else this.leave();
   }
 
   private come_back(): void {
     this.wants_ = true;
-    this.worker_.post({ kind: 'follow', watch: this.token_ });
+    this.parts_.worker.post({ kind: 'follow', watch: this.token_ });
   }
 
   private leave(): void {
     this.wants_ = false;
-    this.worker_.post({ kind: 'follow', watch: '' });
+    this.parts_.worker.post({ kind: 'follow', watch: '' });
     this.become('left');
-    this.navigation_.stop_flight();
+    this.parts_.navigation.stop_flight();
   }
 
   private tell_present(): void {
     const name = within_bytes(this.name_.value.trim());
     const allowed = { pings: this.pings_.checked, tells_places: this.places_.checked };
-    this.worker_.post({ kind: 'present', on: true, name, ...allowed });
+    this.parts_.worker.post({ kind: 'present', on: true, name, ...allowed });
   }
 
   private present(): void {
@@ -184,7 +178,7 @@ export class Together {
   }
 
   private stop(): void {
-    this.worker_.post({ kind: 'present', on: false, name: '', pings: false, tells_places: false });
+    this.parts_.worker.post({ kind: 'present', on: false, name: '', pings: false, tells_places: false });
     this.become('alone');
   }
 
@@ -207,7 +201,7 @@ export class Together {
     if (role === 'alone' || role === 'left') this.parted.emit();
     const watching = role === 'watching';
     document.body.classList.toggle('watching', watching);
-    this.toolbar_.watching = watching;
+    this.parts_.toolbar.watching = watching;
     this.view_.setAttribute('role', watching ? 'img' : 'application');
     const leading = role === 'leading';
     for (const id of ['present-link', 'present-copy', 'present-stop']) by_id(id, HTMLElement).hidden = !leading;

@@ -1,10 +1,10 @@
 import { CaptionView, prepare } from '../captions/caption';
 import { is_for_page } from '../input/view_input';
+import { by_id, hint_at_more, on_click } from '../page/dom';
 import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
-import type { Stop, Tour } from '../tour/tour';
-import { by_id, hint_at_more, on_click } from './dom';
-import type { Doors } from './doors';
+import type { Portal, Stop, Tour } from '../tour/tour';
+import type { PortalScenes } from './portal_scenes';
 
 /** The card of a tour: caption, buttons and keys. */
 export class TourView {
@@ -18,11 +18,13 @@ export class TourView {
 
   constructor(
     player: TourPlayer,
-    private readonly doors_: Doors,
+    private readonly scenes_: PortalScenes,
+    take: (portal: Portal, scene_id: string) => void,
   ) {
     this.portal_.addEventListener('click', () => {
-      const { stop } = player.state;
-      if (stop?.portal) doors_.enter(stop.portal);
+      const portal = player.state.stop?.portal;
+      const scene_id = portal && scenes_.target_of(portal).scene_id;
+      if (portal && scene_id) take(portal, scene_id);
     });
     on_click('tour-previous', () => player.previous());
     on_click('tour-next', () => player.next());
@@ -77,13 +79,13 @@ export class TourView {
   }
 
   private show_portal(stop: Stop | undefined): void {
-    const door = stop?.portal && this.doors_.behind(stop.portal);
-    const is_closed = door !== undefined && door.scene_id === undefined;
-    this.portal_.hidden = door === undefined;
+    const target = stop?.portal && this.scenes_.target_of(stop.portal);
+    const is_closed = target !== undefined && target.scene_id === undefined;
+    this.portal_.hidden = target === undefined;
     this.portal_.disabled = is_closed;
-    by_id('tour-portal-text', HTMLElement).textContent = door ? text.portals.to({ scene: door.title }) : '';
+    by_id('tour-portal-text', HTMLElement).textContent = target ? text.portals.to({ scene: target.title }) : '';
     const closed = by_id('tour-closed', HTMLElement);
     closed.hidden = !is_closed;
-    closed.textContent = is_closed ? text.portals.closed({ scene: door.title }) : '';
+    closed.textContent = is_closed ? text.portals.closed({ scene: target.title }) : '';
   }
 }

@@ -1,8 +1,8 @@
+import type { Notice } from '../page/notice';
 import type { SessionState } from '../session/state';
 import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
-import type { Notice } from './notice';
 
 const tones_hz = [660, 880] as const;
 const tone_s = 0.18;

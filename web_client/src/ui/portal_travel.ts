@@ -1,40 +1,25 @@
-// Leads visitors through portals. The old picture covers the new scene until that has one from where they arrive.
+// Takes visitors through portals. The old picture covers the new scene until that has one from where they arrive.
 import { same_view } from '../camera/same_view';
-import { address_in, address_led_to, arrival, door_of, type Door } from '../portals/portals';
-import { list_scenes, scene_name, type SceneListing } from '../session/scenes';
-import type { AccessToken } from '../session/token';
+import { make } from '../page/dom';
+import type { PageParts } from '../page/parts';
+import { address_in, address_led_to, arrival } from '../portals/portals';
+import { scene_name } from '../session/scenes';
 import type { SharedView } from '../tour/share';
-import type { Portal, Tour } from '../tour/tour';
-import type { WorkerClient } from '../worker/client';
-import { make } from './dom';
-import type { Navigation } from './navigation';
-import type { Notice } from './notice';
+import type { Portal } from '../tour/tour';
 
-interface DoorParts {
-  readonly view: HTMLElement;
-  readonly worker: WorkerClient;
-  readonly navigation: Navigation;
-  readonly notice: Notice;
-  readonly token: AccessToken;
-}
-
-const prepare_again_ms = 60_000;
 const longest_cover_ms = 5000; // after the arrival
 const fade_ms = 400; // and a little
 
-export class Doors {
-  private scenes_: readonly SceneListing[] = []; // that `scenes_for_` may see
-  private scenes_for_ = '';
+export class PortalTravel {
   /** `by`: the portal; undefined: the browser's history. */
   private going_: { readonly by: Portal | undefined; readonly scene_id: string } | undefined;
   private awaited_: number | undefined; // the pose whose picture uncovers it, or a later one
   private cover_ends_: ReturnType<typeof setTimeout> | undefined;
   private cover_: HTMLCanvasElement | undefined;
-  private readonly prepared_ms_ = new Map<string, number>();
 
   /** `present`: the view that the visitor has now. */
   constructor(
-    private readonly parts_: DoorParts,
+    private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice'>,
     private readonly present_: () => SharedView,
   ) {
     const { worker, navigation } = parts_;
@@ -59,38 +44,8 @@ export class Doors {
     return ![scene_id, scene_name(scene_id), ''].includes(this.address_scene);
   }
 
-  /** Learns which scenes this visitor may enter, where a tour leads to one. */
-  async learn(tours: readonly Tour[]): Promise<void> {
-    if (tours.some(({ stops }) => stops.some(({ portal }) => portal))) await this.scenes();
-  }
-
-  async scenes(): Promise<readonly SceneListing[]> {
-    const token = this.parts_.token.value;
-    // An empty list is one that could not be had.
-    if (this.scenes_.length === 0 || this.scenes_for_ !== token) {
-      this.scenes_ = await list_scenes(location.href, token);
-      this.scenes_for_ = token;
-    }
-    return this.scenes_;
-  }
-
-  behind(portal: Portal): Door {
-    return door_of(portal, this.scenes_);
-  }
-
-  /** The visitor is near: asks the server to have the scene ready. */
-  prepare(portal: Portal): void {
-    const { scene_id } = this.behind(portal);
-    const now_ms = performance.now();
-    if (!scene_id || now_ms - (this.prepared_ms_.get(scene_id) ?? -Infinity) < prepare_again_ms) return;
-    this.prepared_ms_.set(scene_id, now_ms);
-    this.parts_.worker.post({ kind: 'prepare', scene_id });
-  }
-
-  enter(portal: Portal): void {
-    const { scene_id } = this.behind(portal);
-    if (!scene_id || this.going_) return;
-    void this.go(portal, scene_id);
+  enter(portal: Portal, scene_id: string): void {
+    if (!this.going_) void this.go(portal, scene_id);
   }
 
   /** The other scene is there. Returns where the visitor arrives; undefined: as the address says. */

@@ -1,7 +1,7 @@
+import { by_id } from '../page/dom';
 import { languages } from '../text/language';
 import { locale, text } from '../text/text';
 import type { Tour } from '../tour/tour';
-import { by_id } from './dom';
 
 /** The choice for whom an author writes: all visitors, or those who read one language. */
 export class AuthorLanguage {

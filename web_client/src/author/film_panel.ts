@@ -2,10 +2,10 @@
 import type { Eye } from '../camera/eye';
 import { cancel_film, film_address, film_endings, film_state, order_film, type FilmWish } from '../film/jobs';
 import { film_eyes, film_fps, film_length_s, most_film_frames, write_tum, write_views } from '../film/path';
+import { make, save_file } from '../page/dom';
 import { duration, number } from '../text/number';
 import { text } from '../text/text';
 import type { Tour } from '../tour/tour';
-import { make, save_file } from './dom';
 
 export interface FilmTools {
   eye(): Eye;

@@ -1,6 +1,6 @@
 import type { Eye } from '../camera/eye';
+import type { Toolbar } from '../page/toolbar';
 import type { TourPlayer } from '../tour/player';
-import type { Toolbar } from './toolbar';
 
 /** Plays an author's tour once. At its end, or by Escape, the author is back where the preview began. */
 export class Preview {

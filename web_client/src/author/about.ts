@@ -1,6 +1,6 @@
 import { camera_modes } from '../camera/mode';
+import { by_id } from '../page/dom';
 import type { SceneAbout } from '../tour/draft';
-import { by_id } from './dom';
 
 /** The fields for what visitors are told of the scene. */
 export class AuthorAbout {

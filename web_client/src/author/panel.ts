@@ -1,6 +1,7 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { SceneSetup } from '../camera/scene_setup';
+import { by_id, on_click, save_file } from '../page/dom';
 import type { SceneListing } from '../session/scenes';
 import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
@@ -8,11 +9,10 @@ import { max_tours } from '../tour/limits';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import { tours_for, type Tour } from '../tour/tour';
 import { untranslated, worded, words_for } from '../tour/words';
-import { AuthorAbout } from './author_about';
-import { AuthorLanguage } from './author_language';
-import { AuthorStops, type MediaFields, type StopActions } from './author_stops';
-import { by_id, on_click, save_file } from './dom';
+import { AuthorAbout } from './about';
 import type { FilmPanel } from './film_panel';
+import { AuthorLanguage } from './language';
+import { AuthorStops, type MediaFields, type StopActions } from './stops';
 
 interface AuthorTools {
   eye(): Eye;

@@ -1,3 +1,4 @@
+import { make } from '../page/dom';
 import { lasting_name } from '../portals/portals';
 import { scene_labels, type SceneListing } from '../session/scenes';
 import { number } from '../text/number';
@@ -5,7 +6,6 @@ import { text } from '../text/text';
 import { longest_flight_s, longest_stay_s, max_text_characters } from '../tour/limits';
 import { default_stay_s, type Stop, type Tour } from '../tour/tour';
 import { words_for } from '../tour/words';
-import { make } from './dom';
 
 /** The fields for pictures, films and sounds (media/author_media.ts). */
 export interface MediaFields {
