@@ -3,7 +3,8 @@ import { Signal } from '#client/base/signal';
 import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
 import type { CameraMode } from '#client/camera/mode';
 import { Dollhouse } from '#client/ground/dollhouse';
-import type { Navigation } from '#client/ui/navigation';
+import { GestureRouter } from '#client/page/gestures';
+import type { Navigation } from '#client/page/navigation';
 import { ceiling_cut, dollhouse_eye, house_around } from '#client/walk/dollhouse';
 import { to_world, type Block, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
 import type { WorkerClient } from '#client/worker/client';
@@ -78,7 +79,7 @@ describe('a visitor of the dollhouse', () => {
       reach: 5,
       loop: { wake: () => undefined },
       taken_over: new Signal(),
-      tapped: undefined as Navigation['tapped'],
+      gestures: new GestureRouter(),
       set_mode: (mode: CameraMode) => made.set_mode(mode),
       // Straight down onto the middle of the floor.
       ray_at: () => ({ origin: to_world(map, { east: 40, north: 35, height: 30 }), direction: [0, 1, 0] as const }),
@@ -123,7 +124,7 @@ describe('a visitor of the dollhouse', () => {
     expect_vec(made.pose.orientation, before.orientation);
     expect(made.mode).toBe('fly');
     expect(clips.at(-1)).toBeUndefined();
-    expect(navigation.tapped).toBeUndefined();
+    expect(navigation.gestures.has('dollhouse')).toBe(false);
     expect(shown).toEqual([true, false]);
     house.leave();
     expect(clips).toHaveLength(2);
@@ -140,11 +141,20 @@ describe('a visitor of the dollhouse', () => {
     expect(made.within([99, 0, 0])).toEqual([20, 0, 0]);
   });
 
+  it('keeps the mode that they chose there', () => {
+    const { house, made } = enter();
+    made.set_mode('walk');
+    house.leave();
+    expect(made.mode).toBe('walk');
+  });
+
   it('points at the floor, also after something else heard the taps', () => {
-    const { house, navigation, chosen } = enter();
-    navigation.tapped = undefined;
-    house.show(0);
-    navigation.tapped!(0.5, 0.5);
+    const { navigation, chosen } = enter();
+    navigation.gestures.set('measure', () => true);
+    navigation.gestures.route({ x: 0.5, y: 0.5, how: 'click' });
+    expect(chosen).toHaveLength(0);
+    navigation.gestures.remove('measure');
+    for (const how of ['click', 'double tap'] as const) navigation.gestures.route({ x: 0.5, y: 0.5, how });
     expect(chosen).toHaveLength(1);
     expect(chosen[0]).toMatchObject({ east: 40, north: 35 });
   });

@@ -3,6 +3,7 @@ import { Signal } from '../base/signal';
 import { add, forward, rotate, scale } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
+import type { Pointed } from '../input/pointers';
 import type { Navigation } from '../page/navigation';
 import { ceiling_cut, dollhouse_eye } from '../walk/dollhouse';
 import { floor_along } from '../walk/floor';
@@ -17,6 +18,8 @@ interface DollhouseParts {
   /** The visitor has pointed at a place on the floor. */
   readonly go_to: (stand: Stand) => void;
 }
+
+const outside_mode: CameraMode = 'orbit';
 
 /** Where the visitor was. */
 interface Before {
@@ -45,11 +48,11 @@ export class Dollhouse {
     if (!this.before_) {
       this.before_ = { eye: navigation.eye, mode: camera.mode };
       navigation.taken_over.emit();
-      navigation.set_mode('orbit');
+      navigation.set_mode(outside_mode);
+      navigation.gestures.set('dollhouse', this.take);
       camera.unlimited = true;
       this.changed.emit(true);
     }
-    navigation.tapped = this.tapped;
     const { eye, focus } = dollhouse_eye(this.map_, this.around_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
     camera.fly_to(eye, focus, reduced_motion);
     navigation.loop.wake();
@@ -65,12 +68,16 @@ export class Dollhouse {
     navigation.loop.wake();
   }
 
-  /** The whole scene again, in the mode from before. The caller moves the camera from where it is. */
+  /**
+   * The whole scene again, in the mode from before, if nobody has chosen another. The caller moves the camera from
+   * where it is.
+   */
   end(): Before | undefined {
     const { before_: before } = this;
+    const { navigation } = this.parts_;
     if (before) {
       this.close();
-      this.parts_.navigation.set_mode(before.mode);
+      if (navigation.camera.mode === outside_mode) navigation.set_mode(before.mode);
     }
     return before;
   }
@@ -82,12 +89,13 @@ export class Dollhouse {
     const { navigation, worker } = this.parts_;
     worker.post({ kind: 'clip', plane: undefined });
     navigation.camera.unlimited = false;
-    if (navigation.tapped === this.tapped) navigation.tapped = undefined;
+    navigation.gestures.remove('dollhouse');
     this.changed.emit(false);
   }
 
-  private readonly tapped = (x: number, y: number): void => {
-    const stand = floor_along(this.map_, this.parts_.navigation.ray_at(x, y));
+  private readonly take = ({ x, y, how }: Pointed): boolean => {
+    const stand = how === 'double tap' ? undefined : floor_along(this.map_, this.parts_.navigation.ray_at(x, y));
     if (stand) this.parts_.go_to(stand);
+    return true;
   };
 }

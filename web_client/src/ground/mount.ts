@@ -49,10 +49,8 @@ export class GroundUse {
     });
     navigation.mode_chosen.listen(() => {
       this.walking_?.stay();
-      const { mode } = navigation.camera;
       this.house_?.leave();
-      navigation.set_mode(mode);
-      if (mode !== 'walk') return;
+      if (navigation.camera.mode !== 'walk') return;
       this.chose_walk_ = true;
       this.walk();
     });

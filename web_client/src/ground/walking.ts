@@ -4,6 +4,7 @@ import { add, dot, forward, length, look_at, normalize, rotate, scale, sub, type
 import type { Eye } from '../camera/eye';
 import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import { place_of } from '../camera/ray';
+import type { Pointed } from '../input/pointers';
 import type { Navigation } from '../page/navigation';
 import { floor_along } from '../walk/floor';
 import { MapWalker } from '../walk/map_walker';
@@ -53,7 +54,7 @@ export class Walking {
     this.picture_.setAttribute('aria-hidden', 'true');
     this.picture_.append(this.ring_);
     view.append(this.picture_);
-    navigation.walk_to = (x, y, again) => this.walk_to(x, y, again);
+    navigation.gestures.set('walk', (pointed) => this.take(pointed));
     const { signal } = this.stop_;
     view.addEventListener('pointermove', (event) => this.pointed(event), { signal });
     view.addEventListener('pointerleave', () => this.show(undefined), { signal });
@@ -64,7 +65,7 @@ export class Walking {
     this.stop_.abort();
     this.stay();
     this.cancel_announcing_();
-    this.parts_.navigation.walk_to = undefined;
+    this.parts_.navigation.gestures.remove('walk');
     this.picture_.remove();
   }
 
@@ -106,11 +107,13 @@ export class Walking {
     this.travel(glide(navigation.eye, eye, reduced_motion ? 0 : flight_s));
   }
 
-  private walk_to(x: number, y: number, again: boolean): boolean {
-    const to = floor_along(this.map, this.parts_.navigation.ray_at(x, y));
+  /** Walks to where a walking visitor clicks on the floor. */
+  private take({ x, y, how }: Pointed): boolean {
+    const { navigation } = this.parts_;
+    const to = navigation.camera.mode === 'walk' ? floor_along(this.map, navigation.ray_at(x, y)) : undefined;
     if (!to) return false;
-    if (again) return true; // the first of two clicks leads there
-    this.parts_.navigation.taken_over.emit();
+    if (how === 'double tap') return true; // the first of two clicks leads there
+    navigation.taken_over.emit();
     this.go_to(to).catch(warn);
     return true;
   }
@@ -145,7 +148,7 @@ export class Walking {
   private pointed({ pointerType, buttons, offsetX, offsetY }: PointerEvent): void {
     const { view, navigation } = this.parts_;
     if (this.walks_ || pointerType !== 'mouse') return;
-    const shows = buttons === 0 && navigation.camera.mode === 'walk' && !navigation.tapped;
+    const shows = buttons === 0 && navigation.camera.mode === 'walk' && !navigation.gestures.has('measure');
     const ray = navigation.ray_at(offsetX / view.clientWidth, offsetY / view.clientHeight);
     this.show(shows ? floor_along(this.map, ray) : undefined);
   }

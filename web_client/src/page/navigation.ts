@@ -18,6 +18,7 @@ import { scene_setup, start_mode } from '../session/camera_messages';
 import { Picks } from '../session/picks';
 import type { SceneFacts, Welcome } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
+import { GestureRouter } from './gestures';
 
 const speed_per_step = 2 ** 0.25;
 const pointing_px = 1; // standard deviation of a click
@@ -43,13 +44,7 @@ export class Navigation {
   readonly speed_chosen = new Signal<number>();
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
-  /** Hears clicks and taps in place of the camera: `x`, `y` are shares of the view, y down. */
-  tapped: ((x: number, y: number) => void) | undefined;
-  /**
-   * Hears clicks and taps of visitors who walk, as `tapped` does; false: they mean something else. `again`: the
-   * second of two.
-   */
-  walk_to: ((x: number, y: number, again: boolean) => boolean) | undefined;
+  readonly gestures = new GestureRouter();
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
   private readonly inertia_ = new Inertia();
@@ -193,7 +188,7 @@ export class Navigation {
     return this.place_at(0.5, 0.5);
   }
 
-  /** The place of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in `tapped`. */
+  /** The place of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in Pointed. */
   async hit_at(x: number, y: number): Promise<Mark | undefined> {
     const ray = this.ray_at(x, y);
     const hit = await this.picks_.hit(ray);
@@ -216,15 +211,13 @@ export class Navigation {
       },
       keys_changed: () => this.take_over(),
       let_go: () => this.loop.wake(),
-      pointed_at: (x, y, how) => {
-        if (this.tapped) {
-          if (how !== 'double tap') this.tapped(x, y);
-        } else if (this.camera.mode === 'walk' && this.walk_to?.(x, y, how === 'double tap')) {
-          return;
-        } else if (how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk')) {
-          void this.point_at(x, y);
-        }
-      },
+      wants_presses: () => this.gestures.has('point'),
+      pointed: (pointed) => this.gestures.route(pointed),
+    });
+    this.gestures.set('look', ({ x, y, how }) => {
+      const looks = how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk');
+      if (looks) void this.look_at(x, y);
+      return looks;
     });
     const pads = new Gamepads({
       moved: () => {
@@ -273,7 +266,7 @@ export class Navigation {
   }
 
   /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */
-  private async point_at(x: number, y: number): Promise<void> {
+  private async look_at(x: number, y: number): Promise<void> {
     const pointed = ++this.pointed_;
     const place = await this.place_at(x, y);
     if (!place || pointed !== this.pointed_) return;
@@ -287,7 +280,7 @@ export class Navigation {
     return this.picks_.at(this.ray_at(x, y));
   }
 
-  /** `x`, `y`: as in `tapped`. */
+  /** `x`, `y`: as in Pointed. */
   ray_at(x: number, y: number): Ray {
     return ray_through(this.eye, x, y, this.view_.clientWidth / Math.max(1, this.view_.clientHeight));
   }

@@ -1,6 +1,7 @@
 // Measures lengths, heights and areas between places that the visitor points at.
 import type { Eye } from '../camera/eye';
 import { place_of } from '../camera/ray';
+import type { Pointed } from '../input/pointers';
 import { area_of, length_of, rise_of, type Mark } from '../measure/measurement';
 import { system_here, systems, written, type Scale, type System } from '../measure/units';
 import { by_id, make, on_click } from '../page/dom';
@@ -44,9 +45,9 @@ export class MeasurePanel {
     on_click('measure-set', () => this.set_scale());
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel !== 'measure') return;
-      if (shown) navigation.tapped = this.tapped;
-      else if (navigation.tapped === this.tapped) navigation.tapped = undefined;
-      if (!shown) this.set([]);
+      if (shown) return navigation.gestures.set('measure', this.take);
+      navigation.gestures.remove('measure');
+      this.set([]);
     });
     navigation.entered.listen(({ scene }) => {
       this.metres_per_unit_ = scene.metresPerUnit || undefined;
@@ -56,7 +57,11 @@ export class MeasurePanel {
     this.show();
   }
 
-  private readonly tapped = (x: number, y: number): void => void this.mark(x, y);
+  /** The first of two clicks has marked the place already. */
+  private readonly take = ({ x, y, how }: Pointed): boolean => {
+    if (how !== 'double tap') void this.mark(x, y);
+    return true;
+  };
 
   private get scale(): Scale {
     return { metres_per_unit: this.metres_per_unit_, system: this.system_.value as System };

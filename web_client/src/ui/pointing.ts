@@ -2,13 +2,12 @@
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { direction_to, place_of } from '../camera/ray';
+import type { Pointed } from '../input/pointers';
 import { by_id, make, on_click } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
 
 const { guide: words } = text;
-const long_press_ms = 600;
-const slack_px = 10; // fingers tremble
 const shown_ms = 5000;
 const most_shown = 8;
 const edge = 0.44; // of the view's sides, from its middle
@@ -21,8 +20,6 @@ interface Shown {
 export class Pointing {
   private readonly button_ = by_id('company-point', HTMLButtonElement);
   private readonly host_ = by_id('pings', HTMLElement);
-  private allowed_ = false;
-  private press_: { readonly x: number; readonly y: number; readonly timer: ReturnType<typeof setTimeout> } | undefined;
   private shown_: readonly Shown[] = [];
   private eye_: Eye | undefined; // of the picture that the visitor sees
   private picture_aspect_ = 0;
@@ -33,15 +30,20 @@ export class Pointing {
     worker.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
     seen.moved.listen((eye) => this.see(eye));
     on_click('company-point', () => void this.point_at(0.5, 0.5));
-    this.bind_presses();
   }
 
   /** Whether this visitor may point at places now. */
   set allowed(allowed: boolean) {
-    this.allowed_ = allowed;
+    const { gestures } = this.parts_.navigation;
     this.button_.hidden = !allowed;
-    if (!allowed) this.end_press();
+    if (allowed) gestures.set('point', this.take);
+    else gestures.remove('point');
   }
+
+  private readonly take = ({ x, y, how }: Pointed): boolean => {
+    if (how === 'press') void this.point_at(x, y);
+    return how === 'press';
+  };
 
   /** The camera of the leader's picture, which this visitor watches. It has its own shape, and is all in the view. */
   watch(eye: Eye): void {
@@ -53,53 +55,6 @@ export class Pointing {
   private see(eye: Eye): void {
     this.eye_ = eye;
     for (const shown of this.shown_) this.put(shown, eye);
-  }
-
-  private bind_presses(): void {
-    const { view } = this.parts_;
-    const capture = { capture: true };
-    view.addEventListener(
-      'pointerdown',
-      (event) => {
-        this.end_press();
-        if (!this.allowed_ || !event.isPrimary || event.button !== 0) return;
-        const { clientX: x, clientY: y } = event;
-        if (event.altKey) {
-          event.stopImmediatePropagation();
-          void this.point_at(...this.share_of(x, y));
-          return;
-        }
-        const timer = setTimeout(() => {
-          this.press_ = undefined;
-          // For the camera the press is over: it is no tap, too.
-          view.dispatchEvent(new PointerEvent('pointercancel', { pointerId: event.pointerId }));
-          void this.point_at(...this.share_of(x, y));
-        }, long_press_ms);
-        this.press_ = { x, y, timer };
-      },
-      capture,
-    );
-    view.addEventListener(
-      'pointermove',
-      (event) => {
-        if (!this.press_) return;
-        // Until it is a drag, the camera hears nothing of it: a follower's would leave the leader.
-        if (Math.hypot(event.clientX - this.press_.x, event.clientY - this.press_.y) > slack_px) this.end_press();
-        else event.stopImmediatePropagation();
-      },
-      capture,
-    );
-    for (const end of ['pointerup', 'pointercancel']) view.addEventListener(end, () => this.end_press(), capture);
-  }
-
-  private end_press(): void {
-    clearTimeout(this.press_?.timer);
-    this.press_ = undefined;
-  }
-
-  private share_of(x: number, y: number): [number, number] {
-    const { left, top, width, height } = this.parts_.view.getBoundingClientRect();
-    return [(x - left) / width, (y - top) / height];
   }
 
   private async point_at(x: number, y: number): Promise<void> {
