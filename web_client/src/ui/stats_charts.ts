@@ -25,12 +25,11 @@ function style(element: Element, name: string): string {
   return getComputedStyle(element).getPropertyValue(name).trim();
 }
 
-/** Colours come from the page's style sheet, light or dark. */
+/** Colours come from the page's style sheet at each drawing, because it may turn light or dark. */
 function axis(host: Element, label: string, more: Partial<uPlot.Axis> = {}): uPlot.Axis {
-  const line = style(host, '--line');
   return {
-    stroke: style(host, '--ink-soft'),
-    grid: { stroke: line, width: 1 },
+    stroke: () => style(host, '--ink-soft'),
+    grid: { stroke: () => style(host, '--line'), width: 1 },
     ticks: { show: false },
     font: '11px system-ui, sans-serif',
     size: 34,
