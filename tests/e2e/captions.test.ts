@@ -20,7 +20,7 @@ beforeAll(async () => {
 
 const with_captions = (...captions: string[]): Promise<FakeServer> => {
   const stops = captions.map((caption, i) => ({
-    ...{ title: `Stop ${i}`, caption, marker: [i, 0, 0], position: [0, 0, -5], orientation: [0, 0, 0, 1] },
+    title: `Stop ${i}`, caption, marker: [i, 0, 0], position: [0, 0, -5], orientation: [0, 0, 0, 1],
   }));
   return start_fake_server(stream, { tours: [{ title: 'Tour', stops }] });
 };

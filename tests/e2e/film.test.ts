@@ -89,7 +89,7 @@ describe('an author', () => {
 it('a film is made for authors alone, within bounds', async () => {
   const order = (role: string, body: object): Promise<Response> =>
     fetch(`${server.url}api/scenes/town/films`, {
-      ...{ method: 'PUT', body: JSON.stringify(body) },
+      method: 'PUT', body: JSON.stringify(body),
       headers: { authorization: `Bearer ${access_token(role, key_file)}` },
     });
   const wish = { kind: 'film', size: [64, 48], views: [[0, 0, -5, 0, 0, 0, 1, 60], 17_000] };

@@ -20,8 +20,8 @@ beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '20000');
   write_tours(path.join(folder, `${hostile}.json`), ({ focus, start_pose }) => {
     const stop = (number: number) => ({
-      ...{ title: `${hostile} ${number}`, caption: `${hostile}</p><script>document.body.dataset.taken=1</script>` },
-      ...{ position: start_pose.position, look_at: focus, marker: focus },
+      title: `${hostile} ${number}`, caption: `${hostile}</p><script>document.body.dataset.taken=1</script>`,
+      position: start_pose.position, look_at: focus, marker: focus,
     });
     return [{ title: hostile, stops: [stop(1), stop(2)] }];
   });

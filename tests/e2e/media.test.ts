@@ -160,7 +160,7 @@ describe('a visitor', () => {
 
   it('finds words in place of what cannot be shown', async () => {
     const stops = [{
-      ...{ title: 'Gone', position: [0, 0, -5], orientation: [0, 0, 0, 1], narration: { src: 'gone.mp3' } },
+      title: 'Gone', position: [0, 0, -5], orientation: [0, 0, 0, 1], narration: { src: 'gone.mp3' },
       media: [{ src: 'gone.jpg', alt: 'A lost picture' }, { src: 'https://elsewhere.example/spy.jpg', alt: 'A foreign one' }],
     }];
     writeFileSync(path.join(folder, 'hall.json'), JSON.stringify({ tours: [{ stops: [...stops, ...stops] }] }));

@@ -26,8 +26,8 @@ beforeAll(async () => {
     const between = (share: number): number[] =>
       start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
     const stop = (title: string, caption: string, share: number) => ({
-      ...{ title, caption, stay_s: 0.5, fov_deg: 60 },
-      ...{ position: between(share), look_at: focus, marker: between(share + 0.3) },
+      title, caption, stay_s: 0.5, fov_deg: 60,
+      position: between(share), look_at: focus, marker: between(share + 0.3),
     });
     const stops = [
       stop('From afar', 'The whole city, as a bird sees it.\nGo nearer by the arrow.', 0.1),

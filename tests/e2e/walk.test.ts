@@ -24,7 +24,7 @@ beforeAll(async () => {
   writeFileSync(
     path.join(folder, 'city.json'),
     JSON.stringify({
-      ...{ up: [0, -1, 0], metres_per_unit: 1, start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] } },
+      up: [0, -1, 0], metres_per_unit: 1, start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] },
       tours: [{ title: 'The streets', stops: [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])] }],
     }),
   );

@@ -128,7 +128,7 @@ describe('a draft of a tour', () => {
       near: 0.2,
       limits: { min: [-20, -20, -20] },
       focus: [0, 0, 0],
-      ...{ title: 'Hall', credits: 'Ada', mode: 'walk', background: '#ffffff' },
+      title: 'Hall', credits: 'Ada', mode: 'walk', background: '#ffffff',
     });
     expect(draft.sidecar(scene)).not.toHaveProperty('licence');
     const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };

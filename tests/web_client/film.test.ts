@@ -6,7 +6,7 @@ import { expect_vec } from './cameras';
 
 const up: Vec3 = [0, -1, 0];
 const stop = (z: number, stay_s: number, fly_s: number): object => ({
-  ...{ position: [0, 0, z], look_at: [0, 0, z + 1], fov_deg: 60, stay_s, fly_s },
+  position: [0, 0, z], look_at: [0, 0, z + 1], fov_deg: 60, stay_s, fly_s,
 });
 const tour_of = (...stops: object[]): Tour => read_tours([{ stops }], up, 1)[0]!;
 

@@ -35,7 +35,7 @@ describe('the language of the page', () => {
 
   it('comes with the tag for numbers, and with what the visitor reads best', () => {
     expect(choose_language('http://host/', ['de-CH', 'en'])).toEqual({
-      ...{ language: 'de', locale: 'de-CH', readers: ['de-CH', 'de'] },
+      language: 'de', locale: 'de-CH', readers: ['de-CH', 'de'],
     });
     expect(choose_language('http://host/?lang=ar', ['nl']).locale).toBe('ar');
     // The page does not speak Dutch, but a tour may.

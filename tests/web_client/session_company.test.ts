@@ -29,8 +29,8 @@ beforeEach(() => {
       state: (state) => states.push(state),
       notice: (message) => notices.push(message),
       lead: ({ name }) => leaders.push(name),
-      ...{ welcome: ignore, config: ignore, frame: ignore, stream_ended: ignore, stats: ignore },
-      ...{ picked: ignore, pinged: ignore, company: ignore, stayed: ignore },
+      welcome: ignore, config: ignore, frame: ignore, stream_ended: ignore, stats: ignore,
+      picked: ignore, pinged: ignore, company: ignore, stayed: ignore,
     },
     { sceneId: 'city', viewportWidthPx: 640, viewportHeightPx: 360, decoders: [Codec.H264], token: 'secret' },
   );

@@ -43,9 +43,9 @@ describe('tours in several languages', () => {
 
 describe('the languages of an author', () => {
   const hall: Stop = {
-    ...{ title: 'Hall', caption: 'about Hall', ...untranslated },
+    title: 'Hall', caption: 'about Hall', ...untranslated,
     eye: { position: [1, 2, 3], orientation: identity, fov_y_rad: 1 },
-    ...{ marker: undefined, stay_s: undefined, fly_s: undefined, portal: undefined },
+    marker: undefined, stay_s: undefined, fly_s: undefined, portal: undefined,
   };
   const draft = (): TourDraft => {
     const made = new TourDraft();

@@ -94,18 +94,18 @@ export class AuthorStops {
     // A translation that is empty is replaced by what stands behind it.
     const behind = this.language_ === '' ? { title: '', caption: words.caption_here } : stop;
     const title = make('input', {
-      ...{ value: written.title, maxLength: 200, placeholder: behind.title, ...in_its_own },
+      value: written.title, maxLength: 200, placeholder: behind.title, ...in_its_own,
       'aria-label': words.title({ n }),
     });
     const caption = make('textarea', {
-      ...{ value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own },
-      ...{ placeholder: behind.caption || words.caption_here, 'aria-label': words.caption({ n }) },
+      value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own,
+      placeholder: behind.caption || words.caption_here, 'aria-label': words.caption({ n }),
       title: words.markdown,
     });
     const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
       make('input', {
-        ...{ type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual },
-        ...{ value: value === undefined ? '' : String(value), 'aria-label': words.of_stop({ field: label, n }) },
+        type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual,
+        value: value === undefined ? '' : String(value), 'aria-label': words.of_stop({ field: label, n }),
       });
     const stay = seconds(words.stay, stop.stay_s, String(Math.round(default_stay_s(stop))), longest_stay_s);
     const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);

@@ -35,21 +35,15 @@ export class AuthorMedia implements MediaFields {
     // Typing in one field rebuilds no other, so what is there now is asked for.
     const set: SetMedium = (i, changed, field) =>
       change({ media: (stop().media ?? []).map((medium, j) => (j === i ? { ...medium, ...changed(medium) } : medium)) }, field);
-    const rows = media.map((medium, i) => {
-      const drop = make('button', { type: 'button', 'aria-label': words.remove({ name: medium.src }), title: words.remove({ name: medium.src }) }, '×');
-      drop.addEventListener('click', () => change({ media: (stop().media ?? []).filter((_, j) => j !== i) }));
-      const name = make('div', { className: 'medium' }, make('span', { dir: 'ltr' }, medium.src), drop);
-      const row = make('section', {}, name, this.alt_of(medium, i, language, set));
-      if (medium.kind !== 'image') row.append(this.captions_of(medium.captions, medium.src, (captions) => set(i, () => ({ captions }))));
-      return row;
-    });
+    const without = (i: number): Partial<Stop> => ({ media: (stop().media ?? []).filter((_, j) => j !== i) });
+    const rows = media.map((medium, i) => this.row_of(medium, i, language, set, () => change(without(i))));
     const { narration } = stop();
     const voice = this.choice({
-      ...{ label: words.narration, control: 'voice', kinds: ['audio'], value: narration?.src ?? '', none: words.none },
+      label: words.narration, control: 'voice', kinds: ['audio'], value: narration?.src ?? '', none: words.none,
       chosen: (src) => change({ narration: src ? { src, captions: narration?.captions ?? '' } : undefined }),
     });
     const add = this.choice({
-      ...{ label: words.add, control: 'medium', kinds: media_kinds, value: '', none: words.choose },
+      label: words.add, control: 'medium', kinds: media_kinds, value: '', none: words.choose,
       chosen: (src) => {
         const kind = kind_of(src);
         if (kind === undefined || kind === 'captions') return;
@@ -66,7 +60,7 @@ export class AuthorMedia implements MediaFields {
     const words = text.media;
     const { sound } = tour;
     const choice = this.choice({
-      ...{ label: words.sound, control: 'sound', kinds: ['audio'], value: sound?.src ?? '', none: words.none },
+      label: words.sound, control: 'sound', kinds: ['audio'], value: sound?.src ?? '', none: words.none,
       chosen: (src) => change({ sound: src ? { src, volume: sound?.volume ?? usual_volume } : undefined }),
     });
     if (!sound) return choice;
@@ -75,11 +69,21 @@ export class AuthorMedia implements MediaFields {
     return make('div', { className: 'media-fields' }, choice, make('label', {}, words.volume, volume));
   }
 
+  private row_of(medium: Medium, i: number, language: string, set: SetMedium, remove: () => void): HTMLElement {
+    const label = text.media.remove({ name: medium.src });
+    const button = make('button', { type: 'button', 'aria-label': label, title: label, onclick: remove }, '×');
+    const name = make('div', { className: 'medium' }, make('span', { dir: 'ltr' }, medium.src), button);
+    const row = make('section', {}, name, this.alt_of(medium, i, language, set));
+    const set_captions = (captions: string): void => set(i, () => ({ captions }));
+    if (medium.kind !== 'image') row.append(this.captions_of(medium.captions, medium.src, set_captions));
+    return row;
+  }
+
   private alt_of(medium: Medium, i: number, language: string, set: SetMedium): HTMLElement {
     const own = language === '';
     const alt = make('input', {
-      ...{ value: own ? medium.alt : (medium.alt_in.get(language) ?? ''), maxLength: max_text_characters, dir: 'auto', lang: language },
-      ...{ placeholder: own ? text.media.alt_hint : medium.alt, required: own && medium.kind === 'image' },
+      value: own ? medium.alt : (medium.alt_in.get(language) ?? ''), maxLength: max_text_characters, dir: 'auto', lang: language,
+      placeholder: own ? text.media.alt_hint : medium.alt, required: own && medium.kind === 'image',
       'aria-label': text.media.alt({ name: medium.src }),
     });
     alt.dataset['control'] = `alt ${i}`;
@@ -94,7 +98,7 @@ export class AuthorMedia implements MediaFields {
 
   private captions_of(value: string, src: string, chosen: (name: string) => void): HTMLElement {
     return this.choice({
-      ...{ label: text.media.captions_of({ name: src }), control: `captions ${src}`, kinds: ['captions'], value, none: text.media.none, chosen },
+      label: text.media.captions_of({ name: src }), control: `captions ${src}`, kinds: ['captions'], value, none: text.media.none, chosen,
     });
   }
 

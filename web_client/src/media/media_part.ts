@@ -29,7 +29,7 @@ export class MediaPart {
     this.addresses_ = new MediaAddresses(location.href, '', '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
-      ...{ voice, background: this.background_, touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive },
+      voice, background: this.background_, touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive,
       storage: browser_storage('localStorage'),
       changed: () => this.update(),
     });

@@ -67,7 +67,7 @@ export class StopMedia {
 
   private film_of(medium: Medium, addresses: MediaAddresses, fail: () => void): HTMLElement {
     const film = make(medium.kind === 'video' ? 'video' : 'audio', {
-      ...{ controls: true, preload: 'metadata', muted: this.muted_, onerror: fail },
+      controls: true, preload: 'metadata', muted: this.muted_, onerror: fail,
       'aria-label': medium.alt || text.media.kinds[medium.kind],
     });
     film.setAttribute('playsinline', '');

@@ -16,7 +16,7 @@ export interface SceneAbout {
 }
 
 export const nothing_said: SceneAbout = {
-  ...{ title: '', credits: '', licence: '', mode: undefined, background: '#000000', metres_per_unit: 0 },
+  title: '', credits: '', licence: '', mode: undefined, background: '#000000', metres_per_unit: 0,
 };
 
 interface DraftState {

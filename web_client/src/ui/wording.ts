@@ -80,7 +80,7 @@ function failed_card(code: Error_Code, message: string, scenes: readonly SceneLi
   switch (code) {
     case Error_Code.UNAUTHORIZED:
       return {
-        ...{ title: cards.unauthorized, text: sentence(message).trim(), asks_token: true },
+        title: cards.unauthorized, text: sentence(message).trim(), asks_token: true,
         ...(has_token && { action: { label: actions.look, does: 'look' } }),
       };
     case Error_Code.UNKNOWN_SCENE:

@@ -87,10 +87,7 @@ class Client {
         this.take_camera(message.sample);
         break;
       case 'view':
-        this.view_ = message.view;
-        this.display_.aspect = aspect_of(message.view);
-        this.quality_ = message.quality;
-        this.send_sizes();
+        this.resize(message);
         break;
       case 'warp':
         this.display_.mode = message.mode;
@@ -142,12 +139,23 @@ class Client {
         this.session_.stop();
         break;
       case 'get_stats':
-        say({ kind: 'stats', request: message.request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
+        this.post_stats(message.request);
         break;
       case 'get_snapshot':
         this.post_snapshot(message.request);
         break;
     }
+  }
+
+  private resize({ view, quality }: Extract<ToWorker, { kind: 'view' }>): void {
+    this.view_ = view;
+    this.display_.aspect = aspect_of(view);
+    this.quality_ = quality;
+    this.send_sizes();
+  }
+
+  private post_stats(request: number): void {
+    say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
   }
 
   private present({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): void {
