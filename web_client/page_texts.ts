@@ -7,16 +7,21 @@ import { messages } from './src/text/messages';
 
 const text = messages(english, 'en', 'en');
 
-const escaped = (plain: string): string =>
-  plain.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
+const escaped = (plain: string): string => plain.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 
 const escaped_text = (key: string): string => escaped(text_called(text, key));
 
 /** Throws where a text is neither an attribute nor all that its element holds. */
 export function with_texts(html: string): string {
   const done = html
-    .replace(/ ([\w-]+)="\{\{([\w.]+)\}\}"/g, (_, name: string, key: string) => ` ${name}="${escaped_text(key)}" data-${name}="${key}"`)
-    .replace(/>\{\{([\w.]+)\}\}<\//g, (_, key: string) => ` data-text="${key}">${escaped_text(key)}</`);
+    .replace(
+      / ([\w-]+)="\{\{([\w.]+)\}\}"/g,
+      (_, name: string, key: string) => ` ${name}="${escaped_text(key)}" data-${name}="${key}"`,
+    )
+    .replace(
+      />\{\{([\w.]+)\}\}<\//g,
+      (_, key: string) => ` data-text="${key}">${escaped_text(key)}</`,
+    );
   const left = /[^>]*\{\{[^}]*\}\}/.exec(done);
   if (left) throw new Error(`index.html: ${left[0].trim()} is not the whole text of an element`);
   return done;

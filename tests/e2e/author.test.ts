@@ -24,7 +24,11 @@ beforeAll(async () => {
 });
 
 /** Opens the page by a link of the role. */
-const open_as = (role: string, query = '', options: BrowserContextOptions = windows.desktop): Promise<WatchedPage> =>
+const open_as = (
+  role: string,
+  query = '',
+  options: BrowserContextOptions = windows.desktop,
+): Promise<WatchedPage> =>
   open(`${workshop.url}${query}#token=${access_token(role, key_file)}`, options);
 
 describe('an author', () => {
@@ -108,7 +112,10 @@ describe('an author', () => {
       await page.getByLabel(`Title of stop ${n}`).waitFor();
     }
     const focused = (): Promise<string | null> =>
-      page.evaluate(() => document.activeElement!.getAttribute('aria-label') ?? document.activeElement!.textContent);
+      page.evaluate(
+        () =>
+          document.activeElement!.getAttribute('aria-label') ?? document.activeElement!.textContent,
+      );
     await page.getByRole('button', { name: 'Move stop 3 up' }).press('Enter');
     expect(await focused()).toBe('Move stop 2 up');
     await page.keyboard.press('Enter');
@@ -124,7 +131,9 @@ describe('an author', () => {
     expect(await page.getByLabel('Flight, s (1)').inputValue()).toBe('');
     for (let i = 0; i < 20 && (await undo.isEnabled()); ++i) await undo.click();
     expect(await undo.isEnabled()).toBe(false);
-    expect(await page.getByLabel('Title of the tour', { exact: true }).inputValue()).not.toBe('Second');
+    expect(await page.getByLabel('Title of the tour', { exact: true }).inputValue()).not.toBe(
+      'Second',
+    );
   });
 
   it('is back where a preview began, by Escape and at its end', async () => {
@@ -225,7 +234,11 @@ describe('an author', () => {
     for (const id of ['author-save', 'author-new', 'author-add', 'author-undo']) {
       await page.locator(`#${id}`).scrollIntoViewIfNeeded();
       const { left, right, bottom } = await rect(`#${id}`);
-      expect([left >= panel.left, right <= panel.right, bottom <= panel.bottom + 1], id).toEqual([true, true, true]);
+      expect([left >= panel.left, right <= panel.right, bottom <= panel.bottom + 1], id).toEqual([
+        true,
+        true,
+        true,
+      ]);
     }
   });
 });

@@ -8,7 +8,13 @@ import { Error_Code } from '#client/wire/wire';
 import { barriers } from './support/axe';
 import { keep_screenshot, new_page, windows } from './support/browser';
 import { settle } from './support/camera';
-import { at_hello, refuse, start_fake_server, type FakeServer, type Script } from './support/fake_server';
+import {
+  at_hello,
+  refuse,
+  start_fake_server,
+  type FakeServer,
+  type Script,
+} from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
 let stream: Script;
@@ -21,7 +27,12 @@ beforeAll(async () => {
 
 const several = [
   { id: 'city', title: 'Demo city' },
-  { id: 'hall', title: 'The great hall of the old town', credits: 'Ada Lovelace', licence: 'CC-BY-4.0' },
+  {
+    id: 'hall',
+    title: 'The great hall of the old town',
+    credits: 'Ada Lovelace',
+    licence: 'CC-BY-4.0',
+  },
   { id: 'garden', title: 'garden' },
 ];
 
@@ -62,7 +73,13 @@ const mode = (presses: number, name: string): Pick<State, 'reach' | 'shown'> => 
   shown: (page) => page.locator('#mode-label', { hasText: name }).waitFor(),
 });
 
-const stop = (caption: string): object => ({ title: 'Hall', caption, position: [0, 0, -5], look_at: [0, 0, 0], marker: [0, 0, 2] });
+const stop = (caption: string): object => ({
+  title: 'Hall',
+  caption,
+  position: [0, 0, -5],
+  look_at: [0, 0, 0],
+  marker: [0, 0, 2],
+});
 const tours = [{ title: 'Ground floor', stops: [stop('Built in 1904. '.repeat(30)), stop('')] }];
 
 const states: Readonly<Record<string, State>> = {
@@ -76,14 +93,19 @@ const states: Readonly<Record<string, State>> = {
     shown: title('Loading the scene'),
   },
   token: {
-    script: refuse(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
+    script: refuse(
+      Error_Code.UNAUTHORIZED,
+      'this server needs an access token: open the link you were given',
+    ),
     shown: title('Access token needed'),
   },
   scenes: {
     scenes: several,
     shown: async (page) => {
       await page.waitForFunction(() =>
-        [...document.querySelectorAll<HTMLImageElement>('#gallery img')].every((img) => img.naturalWidth > 0),
+        [...document.querySelectorAll<HTMLImageElement>('#gallery img')].every(
+          (img) => img.naturalWidth > 0,
+        ),
       );
     },
   },
@@ -93,8 +115,14 @@ const states: Readonly<Record<string, State>> = {
     query: '?scene=nope',
     shown: (page) => page.getByRole('link', { name: 'garden' }).waitFor(),
   },
-  busy: { script: refuse(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'), shown: title('The server is busy') },
-  idle: { script: refuse(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'), shown: title('Paused') },
+  busy: {
+    script: refuse(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'),
+    shown: title('The server is busy'),
+  },
+  idle: {
+    script: refuse(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'),
+    shown: title('Paused'),
+  },
   'old-page': {
     script: refuse(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
     shown: title('do not fit together'),
@@ -110,7 +138,9 @@ const states: Readonly<Record<string, State>> = {
   broken: {
     reach: async (page) => {
       await settle(page);
-      await page.evaluate(() => window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })));
+      await page.evaluate(() =>
+        window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })),
+      );
     },
     shown: button('Reload'),
   },
@@ -142,7 +172,10 @@ const states: Readonly<Record<string, State>> = {
     reach: settle,
     shown: async (page, server) => {
       const message = 'nothing has moved for 9 minutes: your place goes to others in a minute';
-      server.peers[0]!.say({ case: 'error', value: { code: Error_Code.IDLE_TIMEOUT, message, fatal: false } });
+      server.peers[0]!.say({
+        case: 'error',
+        value: { code: Error_Code.IDLE_TIMEOUT, message, fatal: false },
+      });
       await page.locator('#notice').waitFor();
     },
   },
@@ -157,8 +190,15 @@ const misplaced = (page: Page): Promise<string[]> =>
       if (width === 0) return []; // hidden
       const outside = left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
       const on_bar =
-        element.id !== 'toolbar' && left < bar.right && right > bar.left && bottom > bar.top && top < bar.bottom;
-      return [...(outside ? [`${element.id} leaves the window`] : []), ...(on_bar ? [`${element.id} lies on the toolbar`] : [])];
+        element.id !== 'toolbar' &&
+        left < bar.right &&
+        right > bar.left &&
+        bottom > bar.top &&
+        top < bar.bottom;
+      return [
+        ...(outside ? [`${element.id} leaves the window`] : []),
+        ...(on_bar ? [`${element.id} lies on the toolbar`] : []),
+      ];
     });
   });
 
@@ -173,22 +213,31 @@ async function take_window(page: Page, name: keyof typeof windows): Promise<void
   await page.setViewportSize(viewport);
   await page.emulateMedia({ colorScheme: 'colorScheme' in rest ? rest.colorScheme : 'light' });
   // The page has laid itself out anew.
-  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+  await page.evaluate(
+    () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))),
+  );
 }
 
 describe.each(Object.entries(contexts))('%s', (_, names) => {
-  it.each(Object.entries(states))('shows the state %s whole', async (state, { reach, shown, query = '', script = stream, ...rest }) => {
-    const server = await start_fake_server(script, { scenes: several.slice(0, 1), poster, ...rest });
-    const { page, errors } = await new_page(windows[names[0]]);
-    await page.goto(server.url + query);
-    await reach?.(page, server);
-    for (const name of names) {
-      await take_window(page, name);
-      await shown(page, server);
-      await keep_screenshot(page, `state-${state}-${name}`);
-      expect(await misplaced(page), name).toEqual([]);
-      expect(await barriers(page), name).toEqual([]);
-    }
-    if (state !== 'lost') expect(errors).toEqual([]);
-  });
+  it.each(Object.entries(states))(
+    'shows the state %s whole',
+    async (state, { reach, shown, query = '', script = stream, ...rest }) => {
+      const server = await start_fake_server(script, {
+        scenes: several.slice(0, 1),
+        poster,
+        ...rest,
+      });
+      const { page, errors } = await new_page(windows[names[0]]);
+      await page.goto(server.url + query);
+      await reach?.(page, server);
+      for (const name of names) {
+        await take_window(page, name);
+        await shown(page, server);
+        await keep_screenshot(page, `state-${state}-${name}`);
+        expect(await misplaced(page), name).toEqual([]);
+        expect(await barriers(page), name).toEqual([]);
+      }
+      if (state !== 'lost') expect(errors).toEqual([]);
+    },
+  );
 });

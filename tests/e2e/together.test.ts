@@ -27,7 +27,8 @@ async function move(page: Page): Promise<void> {
   await settle(page);
 }
 
-const apart = async (a: Page, b: Page): Promise<number> => distance(await pose_of(a), await pose_of(b));
+const apart = async (a: Page, b: Page): Promise<number> =>
+  distance(await pose_of(a), await pose_of(b));
 
 describe('a presentation', () => {
   it('leads others on streams of their own, who may leave it and come back', async () => {
@@ -123,7 +124,9 @@ describe('a presentation', () => {
     expect(at[1]).toBeCloseTo((500 - 360) / 1280, 1);
     await keep_screenshot(watcher, 'together-ping-watched');
     await watcher.keyboard.press('KeyM');
-    expect(await watcher.evaluate(() => document.querySelector('#mode-label')!.textContent)).toBe('Orbit');
+    expect(await watcher.evaluate(() => document.querySelector('#mode-label')!.textContent)).toBe(
+      'Orbit',
+    );
     await leader.goto('about:blank'); // its place is free
     await watcher.getByText('Nobody leads here now').waitFor();
     await watcher.getByRole('button', { name: 'Look around myself' }).tap();
@@ -133,12 +136,19 @@ describe('a presentation', () => {
   });
 
   it('grants watching to those without a token, and is found by links of role spectator', async () => {
-    const server: RunningServer = await start_server(scene, [...counted, '--token-key-file', key_file]);
+    const server: RunningServer = await start_server(scene, [
+      ...counted,
+      '--token-key-file',
+      key_file,
+    ]);
     const { page: spectator } = await new_page(windows.desktop);
     await spectator.goto(`${server.url}#token=${access_token('spectator', key_file)}`);
     await spectator.getByRole('heading', { name: 'Nobody leads here now' }).waitFor();
     await keep_screenshot(spectator, 'together-nobody');
-    const { page: leader } = await open(`${server.url}#token=${access_token('viewer', key_file)}`, windows.desktop);
+    const { page: leader } = await open(
+      `${server.url}#token=${access_token('viewer', key_file)}`,
+      windows.desktop,
+    );
     const link = await present(leader);
     expect(link).not.toContain('token=');
     await spectator.getByText('Ada leads').waitFor();
@@ -149,7 +159,8 @@ describe('a presentation', () => {
     await keep_screenshot(guest, 'together-guest');
     expect(await guest.locator('#company-action').isHidden()).toBe(true);
     await leader.locator('#present-stop').click();
-    for (const page of [spectator, guest]) await page.getByRole('heading', { name: 'Nobody leads here now' }).waitFor();
+    for (const page of [spectator, guest])
+      await page.getByRole('heading', { name: 'Nobody leads here now' }).waitFor();
     await leader.getByRole('button', { name: 'Present', exact: true }).click();
     for (const page of [spectator, guest]) await page.getByText('Ada leads').waitFor();
   });

@@ -7,7 +7,10 @@ describe('the gesture router', () => {
   const click: Pointed = { x: 0.5, y: 0.5, how: 'click' };
 
   /** `names`: the takers, in the order in which they come; each takes what `takes` says. */
-  function router(names: readonly TakerName[], takes: (name: TakerName, pointed: Pointed) => boolean = () => true) {
+  function router(
+    names: readonly TakerName[],
+    takes: (name: TakerName, pointed: Pointed) => boolean = () => true,
+  ) {
     const heard: TakerName[] = [];
     const gestures = new GestureRouter();
     for (const name of names) {
@@ -20,7 +23,10 @@ describe('the gesture router', () => {
   }
 
   it('asks the takers in a fixed order, whenever they came', () => {
-    const { gestures, heard } = router(['look', 'walk', 'dollhouse', 'measure', 'point'], () => false);
+    const { gestures, heard } = router(
+      ['look', 'walk', 'dollhouse', 'measure', 'point'],
+      () => false,
+    );
     gestures.route(click);
     expect(heard).toEqual(['point', 'measure', 'dollhouse', 'walk', 'look']);
   });

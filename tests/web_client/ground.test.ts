@@ -10,7 +10,14 @@ import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
 import { stroll } from '#client/walk/stroll';
-import { cells_per_eye_height, clear_at, eyes_of, to_grid, type Stand, type WalkMap } from '#client/walk/walk_map';
+import {
+  cells_per_eye_height,
+  clear_at,
+  eyes_of,
+  to_grid,
+  type Stand,
+  type WalkMap,
+} from '#client/walk/walk_map';
 import { stand_below } from '#client/walk/walker';
 import type { AccessToken } from '#client/session/token';
 import { expect_vec } from './cameras';
@@ -38,7 +45,11 @@ function walker(position: Vec3, ahead: Vec3, on: WalkMap = map): CameraControlle
   return camera;
 }
 
-function hold(camera: CameraController, seconds: number, axes: Partial<typeof no_axes> = { forward: 1 }): Vec3[] {
+function hold(
+  camera: CameraController,
+  seconds: number,
+  axes: Partial<typeof no_axes> = { forward: 1 },
+): Vec3[] {
   return Array.from({ length: Math.round(seconds * 60) }, () => {
     camera.step(1 / 60, { ...no_axes, ...axes });
     return camera.pose.position;
@@ -54,7 +65,9 @@ function rest(camera: CameraController): void {
 const is_clear = (on: WalkMap, place: Vec3): boolean => {
   const [east, north, height] = to_grid(on, place);
   const feet = height - cells_per_eye_height;
-  return [-on.step, 0, on.step].some((late) => clear_at(on, Math.floor(east), Math.floor(north), feet + late) >= 0);
+  return [-on.step, 0, on.step].some(
+    (late) => clear_at(on, Math.floor(east), Math.floor(north), feet + late) >= 0,
+  );
 };
 
 describe('walking', () => {
@@ -82,7 +95,9 @@ describe('walking', () => {
     expect(heights.at(-1)).toBeGreaterThan(2.72 + eye_m - 0.15);
     expect(way.at(-1)![0]).toBeGreaterThan(6.5);
     // A stair has 17 cm.
-    expect(Math.max(...heights.slice(1).map((z, k) => Math.abs(z - heights[k]!)))).toBeLessThan(0.04);
+    expect(Math.max(...heights.slice(1).map((z, k) => Math.abs(z - heights[k]!)))).toBeLessThan(
+      0.04,
+    );
     rest(camera);
     const stand = stand_below(map, camera.pose.position)!;
     expect(length(sub(camera.pose.position, eyes_of(map, stand)))).toBeLessThan(0.05);
@@ -106,7 +121,13 @@ describe('walking', () => {
     let axes: Partial<typeof no_axes> = {};
     for (let frame = 0; frame < 10 * 60 * 60; ++frame) {
       if (frame % 40 === 0)
-        axes = { forward: random() - 0.3, right: random() - 0.5, turn_right: random() - 0.5, up: random() - 0.5, fast: random() < 0.3 };
+        axes = {
+          forward: random() - 0.3,
+          right: random() - 0.5,
+          turn_right: random() - 0.5,
+          up: random() - 0.5,
+          fast: random() < 0.3,
+        };
       camera.step(1 / 60, { ...no_axes, ...axes });
       const { position } = camera.pose;
       if (!is_clear(map, position)) throw new Error(`frame ${frame}: at ${position.join(' ')}`);
@@ -164,7 +185,9 @@ describe('pointing at the floor', () => {
   });
 
   it('is right below', () => {
-    expect(length(sub(place(floor_along(map, ray([-1, 1, eye_m], [-1, 1, 0])))!, [-1, 1, 0]))).toBeLessThan(0.1);
+    expect(
+      length(sub(place(floor_along(map, ray([-1, 1, eye_m], [-1, 1, 0])))!, [-1, 1, 0])),
+    ).toBeLessThan(0.1);
   });
 });
 
@@ -209,7 +232,9 @@ describe('the plan', () => {
     const yard = flat_map(30, 20, (x) => x !== 12);
     const { width, height, rgba, cells } = await plan_picture(yard, 0);
     expect([width, height, cells]).toEqual([30, 20, 1]);
-    const pixel = (x: number, y: number): number[] => [...rgba.slice(4 * (y * width + x), 4 * (y * width + x) + 4)];
+    const pixel = (x: number, y: number): number[] => [
+      ...rgba.slice(4 * (y * width + x), 4 * (y * width + x) + 4),
+    ];
     expect(pixel(3, 3)).toEqual([255, 255, 255, 255]);
     expect(pixel(12, 3)).toEqual([0, 0, 0, 0]);
   });
@@ -218,7 +243,8 @@ describe('the plan', () => {
     const ground = await plan_picture(map, 0);
     const upper = await plan_picture(map, 1);
     expect(upper.east).toBeGreaterThan(ground.east);
-    const dark = (rgba: Uint8ClampedArray): number => rgba.filter((value, i) => i % 4 === 0 && value === 41 && rgba[i + 3] === 255).length;
+    const dark = (rgba: Uint8ClampedArray): number =>
+      rgba.filter((value, i) => i % 4 === 0 && value === 41 && rgba[i + 3] === 255).length;
     expect(dark(ground.rgba)).toBeGreaterThan(20);
     expect(dark(upper.rgba)).toBeGreaterThan(10);
   });
@@ -231,12 +257,15 @@ describe('the plan', () => {
     const turned = { ...view, up_rad: Math.PI / 2 };
     expect_vec(px_of(turned, 41, 30), [100, 47]);
     expect_vec(px_of(turned, 40, 31), [97, 50]);
-    for (const up_rad of [0, 1, -2.5]) expect_vec(cells_of({ ...view, up_rad }, ...px_of({ ...view, up_rad }, 17, 55)), [17, 55]);
+    for (const up_rad of [0, 1, -2.5])
+      expect_vec(cells_of({ ...view, up_rad }, ...px_of({ ...view, up_rad }, 17, 55)), [17, 55]);
   });
 });
 
 describe('a ground that the server still seeks', () => {
-  const asked = vi.fn(() => Promise.resolve(new Response(null, { status: 202, headers: { 'retry-after': '5' } })));
+  const asked = vi.fn(() =>
+    Promise.resolve(new Response(null, { status: 202, headers: { 'retry-after': '5' } })),
+  );
   const told = vi.fn();
   let ground: SceneGround;
 

@@ -35,12 +35,21 @@ describe('the language of the page', () => {
 
   it('comes with the tag for numbers, and with what the visitor reads best', () => {
     expect(choose_language('http://host/', ['de-CH', 'en'])).toEqual({
-      language: 'de', locale: 'de-CH', readers: ['de-CH', 'de'],
+      language: 'de',
+      locale: 'de-CH',
+      readers: ['de-CH', 'de'],
     });
     expect(choose_language('http://host/?lang=ar', ['nl']).locale).toBe('ar');
     // The page does not speak Dutch, but a tour may.
-    expect(choose_language('http://host/', ['nl', 'ko'])).toMatchObject({ language: 'ko', readers: ['nl', 'ko'] });
-    expect(choose_language('http://host/', ['nl'])).toMatchObject({ language: 'en', locale: 'en', readers: ['nl', 'en'] });
+    expect(choose_language('http://host/', ['nl', 'ko'])).toMatchObject({
+      language: 'ko',
+      readers: ['nl', 'ko'],
+    });
+    expect(choose_language('http://host/', ['nl'])).toMatchObject({
+      language: 'en',
+      locale: 'en',
+      readers: ['nl', 'en'],
+    });
   });
 });
 
@@ -48,12 +57,16 @@ const read_catalogue = (name: string): Catalogue =>
   JSON.parse(readFileSync(path.join(locales, `${name}.json`), 'utf8')) as Catalogue;
 
 /** Every text with its key, as its forms: those of a plural by their category, else one without a category. */
-function forms_of(catalogue: Catalogue, prefix = ''): Map<string, Readonly<Record<string, string>>> {
+function forms_of(
+  catalogue: Catalogue,
+  prefix = '',
+): Map<string, Readonly<Record<string, string>>> {
   const found = new Map<string, Readonly<Record<string, string>>>();
   for (const [name, node] of Object.entries(catalogue)) {
     const key = prefix + name;
     if (typeof node === 'string') found.set(key, { '': node });
-    else if (typeof node['other'] === 'string') found.set(key, node as Readonly<Record<string, string>>);
+    else if (typeof node['other'] === 'string')
+      found.set(key, node as Readonly<Record<string, string>>);
     else for (const [inner, forms] of forms_of(node, `${key}.`)) found.set(inner, forms);
   }
   return found;
@@ -85,7 +98,8 @@ describe.each([...languages, 'operator'])('the catalogue %s', (name) => {
   });
 
   it('has the values of English in them', () => {
-    for (const [key, forms] of translated) expect(all_values(forms), key).toEqual(all_values(original.get(key)!));
+    for (const [key, forms] of translated)
+      expect(all_values(forms), key).toEqual(all_values(original.get(key)!));
   });
 
   it('has a plural form for every number, and no other', () => {
@@ -93,7 +107,8 @@ describe.each([...languages, 'operator'])('the catalogue %s', (name) => {
     const { pluralCategories } = rules.resolvedOptions();
     for (const [key, forms] of translated) {
       if (!('other' in forms)) continue;
-      for (let n = 0; n <= 200; ++n) expect(forms[`=${n}`] ?? forms[rules.select(n)], `${key}: ${n}`).toBeDefined();
+      for (let n = 0; n <= 200; ++n)
+        expect(forms[`=${n}`] ?? forms[rules.select(n)], `${key}: ${n}`).toBeDefined();
       const categories = Object.keys(forms).filter((form) => !/^=\d+$/.test(form));
       expect(pluralCategories, key).toEqual(expect.arrayContaining(categories));
     }
@@ -110,7 +125,11 @@ describe.each([...languages, 'operator'])('the catalogue %s', (name) => {
 
 describe('messages', () => {
   it('have the values, with numbers as the locale writes them', () => {
-    const { place, plain } = messages({ place: '{n} of {count}', plain: 'Stops' } as const, 'en', 'de');
+    const { place, plain } = messages(
+      { place: '{n} of {count}', plain: 'Stops' } as const,
+      'en',
+      'de',
+    );
     expect([place({ n: 'one', count: 12345 }), plain]).toEqual(['one of 12.345', 'Stops']);
   });
 
@@ -143,7 +162,12 @@ it('writes numbers and times', () => {
   expect(decimals(2, 1)).toBe('2.0');
   expect(factor(1.68179)).toBe('1.7×');
   expect([0.4, 1, 45, 89.4, 90, 600].map(duration)).toEqual([
-    'a moment', '1 second', '45 seconds', '89 seconds', '2 minutes', '10 minutes',
+    'a moment',
+    '1 second',
+    '45 seconds',
+    '89 seconds',
+    '2 minutes',
+    '10 minutes',
   ]);
 });
 
@@ -159,25 +183,46 @@ describe('texts for people', () => {
     if (ts.isImportDeclaration(parent) || ts.isLiteralTypeNode(parent)) return true;
     for (let at: ts.Node = parent; !ts.isSourceFile(at); at = at.parent) {
       if (ts.isStatement(at)) return false;
-      const called = ts.isCallExpression(at) || ts.isNewExpression(at) ? at.expression.getText() : '';
-      if (/^console\.|^require$|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(called)) return true;
+      const called =
+        ts.isCallExpression(at) || ts.isNewExpression(at) ? at.expression.getText() : '';
+      if (
+        /^console\.|^require$|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(
+          called,
+        )
+      )
+        return true;
     }
     return false;
   }
 
   /** Two words, or one that begins a sentence. */
-  const is_prose = (words: string): boolean => /[a-z]{2,} [a-z]{2,}/i.test(words) || /^[A-Z][a-z]{2,}( |$)/.test(words);
+  const is_prose = (words: string): boolean =>
+    /[a-z]{2,} [a-z]{2,}/i.test(words) || /^[A-Z][a-z]{2,}( |$)/.test(words);
 
   // Shaders, markup and names that browsers give.
-  const not_prose = /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad)[A-Z]?[a-z]*$|^(OffscreenCanvas|WebSocket|Worker|Notification|Bearer |noopener noreferrer)$/;
+  const not_prose =
+    /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad)[A-Z]?[a-z]*$|^(OffscreenCanvas|WebSocket|Worker|Notification|Bearer |noopener noreferrer)$/;
 
   it('are in the files of the languages alone', () => {
     const loose: string[] = [];
     for (const file of files) {
-      const tree = ts.createSourceFile(file, readFileSync(file, 'utf8'), ts.ScriptTarget.ES2022, true);
+      const tree = ts.createSourceFile(
+        file,
+        readFileSync(file, 'utf8'),
+        ts.ScriptTarget.ES2022,
+        true,
+      );
       const look = (node: ts.Node): void => {
-        const is_literal = ts.isStringLiteralLike(node) || ts.isTemplateHead(node) || ts.isTemplateMiddleOrTemplateTail(node);
-        if (is_literal && is_prose(node.text) && !not_prose.test(node.text) && !is_for_machines(node)) {
+        const is_literal =
+          ts.isStringLiteralLike(node) ||
+          ts.isTemplateHead(node) ||
+          ts.isTemplateMiddleOrTemplateTail(node);
+        if (
+          is_literal &&
+          is_prose(node.text) &&
+          !not_prose.test(node.text) &&
+          !is_for_machines(node)
+        ) {
           const { line } = tree.getLineAndCharacterOfPosition(node.getStart());
           loose.push(`${path.relative(source, file)}:${line + 1}: ${node.text.slice(0, 60)}`);
         }

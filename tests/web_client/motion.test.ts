@@ -1,6 +1,14 @@
 // Walking, flights, and the glide after a gesture.
 import { describe, expect, it } from 'vitest';
-import { angle_between, axis_angle, identity, look_at, rotate, slerp, type Vec3 } from '#client/base/vector';
+import {
+  angle_between,
+  axis_angle,
+  identity,
+  look_at,
+  rotate,
+  slerp,
+  type Vec3,
+} from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
@@ -114,7 +122,12 @@ describe('a double click', () => {
   });
 
   it('takes four points of the view for a surface that faces the eye', () => {
-    const [left, right, top, bottom]: Vec3[] = [[-1, 2, 5], [1, 2, 5], [0, 2, 6], [0, 2, 4]];
+    const [left, right, top, bottom]: Vec3[] = [
+      [-1, 2, 5],
+      [1, 2, 5],
+      [0, 2, 6],
+      [0, 2, 4],
+    ];
     const floor = surface_of([left, right, top, bottom], [0, 0, 0])!;
     expect(floor.point).toEqual([0, 2, 5]);
     expect(floor.normal.map((v) => Math.round(v * 1e9) / 1e9 + 0)).toEqual([0, -1, 0]);
@@ -172,7 +185,13 @@ describe('a flight', () => {
 
 describe('orientations', () => {
   it('look at a point with up upright, in all directions', () => {
-    for (const to of [[0, 0, 5], [0, 0, -5], [5, 1, 0], [-5, -2, 1], [1, -3, -2]] as Vec3[]) {
+    for (const to of [
+      [0, 0, 5],
+      [0, 0, -5],
+      [5, 1, 0],
+      [-5, -2, 1],
+      [1, -3, -2],
+    ] as Vec3[]) {
       const q = look_at([0, 0, 0], to, [0, -1, 0]);
       const size = Math.hypot(...to);
       expect_vec(rotate(q, [0, 0, 1]), to.map((v) => v / size) as unknown as Vec3);

@@ -6,7 +6,12 @@ import type { SessionState } from '#client/session/state';
 import { Codec, Error_Code } from '#client/wire/wire';
 import { fake_network, FakeTime, type FakeSocket } from './fakes';
 
-const pose = { poseId: 1n, clientTimeUs: 1000n, worldFromCamera: { orientation: { w: 1 } }, fovYRad: 1 };
+const pose = {
+  poseId: 1n,
+  clientTimeUs: 1000n,
+  worldFromCamera: { orientation: { w: 1 } },
+  fovYRad: 1,
+};
 const ignore = (): void => undefined;
 
 let time: FakeTime;
@@ -29,10 +34,23 @@ beforeEach(() => {
       state: (state) => states.push(state),
       notice: (message) => notices.push(message),
       lead: ({ name }) => leaders.push(name),
-      welcome: ignore, config: ignore, frame: ignore, stream_ended: ignore, stats: ignore,
-      picked: ignore, pinged: ignore, company: ignore, stayed: ignore,
+      welcome: ignore,
+      config: ignore,
+      frame: ignore,
+      stream_ended: ignore,
+      stats: ignore,
+      picked: ignore,
+      pinged: ignore,
+      company: ignore,
+      stayed: ignore,
     },
-    { sceneId: 'city', viewportWidthPx: 640, viewportHeightPx: 360, decoders: [Codec.H264], token: 'secret' },
+    {
+      sceneId: 'city',
+      viewportWidthPx: 640,
+      viewportHeightPx: 360,
+      decoders: [Codec.H264],
+      token: 'secret',
+    },
   );
 });
 
@@ -62,7 +80,10 @@ describe('a session in company', () => {
     expect(cases(0)).toEqual(['hello']);
     socket(0).say({ case: 'lead', value: { name: 'Ada' } });
     expect(leaders).toEqual(['Ada']);
-    socket(0).say({ case: 'error', value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true } });
+    socket(0).say({
+      case: 'error',
+      value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true },
+    });
     expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'no_leader' });
     session.retry();
     socket(1).events.opened();
@@ -84,7 +105,11 @@ describe('a session in company', () => {
     session.send_pose(pose);
     session.greet_anew({ watch: 'w', follow: true });
     socket(1).events.opened();
-    expect(socket(1).sent('hello')[0]).toMatchObject({ sceneId: 'city', watch: 'w', resume: { token: 'again' } });
+    expect(socket(1).sent('hello')[0]).toMatchObject({
+      sceneId: 'city',
+      watch: 'w',
+      resume: { token: 'again' },
+    });
     expect(socket(1).sent('hello')[0]!.resume!.pose).toBeUndefined(); // that was in the other scene
     socket(1).say({ case: 'welcome', value: { scene: { sceneId: 'park' } } });
     expect(cases(1)).toEqual(['hello', 'follow']);
@@ -100,10 +125,17 @@ describe('a session in company', () => {
     go_live();
     session.greet_anew({ watch: 'w', follow: true });
     socket(1).events.opened();
-    socket(1).say({ case: 'welcome', value: { watching: true, mayLeave, scene: { sceneId: 'park' } } });
+    socket(1).say({
+      case: 'welcome',
+      value: { watching: true, mayLeave, scene: { sceneId: 'park' } },
+    });
     session.greet_anew({ watch: '' });
     socket(2).events.opened();
-    expect(socket(2).sent('hello')[0]).toMatchObject({ sceneId, watch: '', resume: { token: 'again' } });
+    expect(socket(2).sent('hello')[0]).toMatchObject({
+      sceneId,
+      watch: '',
+      resume: { token: 'again' },
+    });
   });
 
   it.each([
@@ -125,7 +157,11 @@ describe('a session in company', () => {
     expect(notices).toEqual(['why']);
     const own = socket(tries + 1);
     own.events.opened();
-    expect(own.sent('hello')[0]).toMatchObject({ sceneId: 'city', watch: '', resume: { token: 'again' } });
+    expect(own.sent('hello')[0]).toMatchObject({
+      sceneId: 'city',
+      watch: '',
+      resume: { token: 'again' },
+    });
     own.say({ case: 'welcome', value: {} });
     expect(cases(tries + 1)).toEqual(['hello']); // it would be led away again
     expect(last_state()).toEqual({ phase: 'live' });
@@ -138,7 +174,10 @@ describe('a session in company', () => {
       socket(i).events.opened();
       if (i % 2 === 1) socket(i).say({ case: 'welcome', value: { watching: true } });
       expect(socket(i).sent('hello')[0]).toMatchObject({ watch: 'w' });
-      socket(i).say({ case: 'error', value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true } });
+      socket(i).say({
+        case: 'error',
+        value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true },
+      });
       time.advance(backoff_ms(2, () => 0.5));
     }
     expect(notices).toEqual([]);

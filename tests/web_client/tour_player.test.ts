@@ -15,9 +15,18 @@ describe('the player', () => {
     caption,
     ...untranslated,
     eye: { position: [x, 0, 0], orientation: identity, fov_y_rad: 1 },
-    marker: undefined, stay_s: 2, fly_s: undefined, portal: undefined,
+    marker: undefined,
+    stay_s: 2,
+    fly_s: undefined,
+    portal: undefined,
   });
-  const tour: Tour = { title: 'a tour', ...untranslated, stops: [1, 2, 3].map((x) => stop(x)), way: undefined, starts_itself: false };
+  const tour: Tour = {
+    title: 'a tour',
+    ...untranslated,
+    stops: [1, 2, 3].map((x) => stop(x)),
+    way: undefined,
+    starts_itself: false,
+  };
 
   /** A camera that flies when it is told to, by hand. */
   function guided(reduced_motion = false) {

@@ -13,7 +13,11 @@ import { StreamSize } from './ui/stream_size';
 import { Together } from './ui/together';
 
 /** Returns what shows a fatal error of the page. `scene_id`: empty for the server's first scene. */
-export function mount_viewer(card: CardView, token: AccessToken, scene_id: string): (message: string) => void {
+export function mount_viewer(
+  card: CardView,
+  token: AccessToken,
+  scene_id: string,
+): (message: string) => void {
   // `?ui=0`, for frames of other pages: nothing but the picture and the tour.
   document.body.classList.toggle('bare', new URLSearchParams(location.search).get('ui') === '0');
   const parts = make_page_parts(token);

@@ -18,7 +18,9 @@ export class AuthorAbout {
     this.mode_.addEventListener('change', () => {
       changed({ mode: camera_modes.find((mode) => mode === this.mode_.value) }, 'mode');
     });
-    this.background_.addEventListener('input', () => changed({ background: this.background_.value }, 'background'));
+    this.background_.addEventListener('input', () =>
+      changed({ background: this.background_.value }, 'background'),
+    );
   }
 
   show(about: SceneAbout): void {

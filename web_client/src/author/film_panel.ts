@@ -1,7 +1,21 @@
 // Pictures and films for authors. It loads when an author opens it.
 import type { Eye } from '../camera/eye';
-import { cancel_film, film_address, film_endings, film_state, order_film, type FilmWish } from '../film/jobs';
-import { film_eyes, film_fps, film_length_s, most_film_frames, write_tum, write_views } from '../film/path';
+import {
+  cancel_film,
+  film_address,
+  film_endings,
+  film_state,
+  order_film,
+  type FilmWish,
+} from '../film/jobs';
+import {
+  film_eyes,
+  film_fps,
+  film_length_s,
+  most_film_frames,
+  write_tum,
+  write_views,
+} from '../film/path';
 import { make, save_file } from '../page/dom';
 import { duration, number } from '../text/number';
 import { text } from '../text/text';
@@ -23,9 +37,19 @@ type Kind = FilmWish['kind'];
 
 const { film: words } = text;
 const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
-  picture: [[1920, 1080], [3840, 2160], [7680, 4320]],
-  panorama: [[4096, 2048], [8192, 4096]],
-  film: [[1280, 720], [1920, 1080]],
+  picture: [
+    [1920, 1080],
+    [3840, 2160],
+    [7680, 4320],
+  ],
+  panorama: [
+    [4096, 2048],
+    [8192, 4096],
+  ],
+  film: [
+    [1280, 720],
+    [1920, 1080],
+  ],
 };
 const look_again_ms = 500;
 const most_wait_ms = 15_000; // where no server answers
@@ -46,7 +70,9 @@ export class FilmPanel {
     place: HTMLElement,
     private readonly tools_: FilmTools,
   ) {
-    this.kind_.append(...(['picture', 'panorama', 'film'] as const).map((kind) => new Option(words[kind], kind)));
+    this.kind_.append(
+      ...(['picture', 'panorama', 'film'] as const).map((kind) => new Option(words[kind], kind)),
+    );
     this.kind_.addEventListener('change', () => this.choose());
     this.make_.addEventListener('click', () => void this.order());
     this.path_.addEventListener('click', () => this.save_path());
@@ -70,7 +96,9 @@ export class FilmPanel {
 
   private choose(): void {
     const { kind } = this;
-    this.size_.replaceChildren(...sizes[kind].map(([x, y], i) => new Option(`${x} × ${y}`, String(i))));
+    this.size_.replaceChildren(
+      ...sizes[kind].map(([x, y], i) => new Option(`${x} × ${y}`, String(i))),
+    );
     this.path_.hidden = kind !== 'film';
     this.say('');
     this.look();
@@ -96,7 +124,8 @@ export class FilmPanel {
     const length_s = film_length_s(tour, this.tools_.reach());
     const most_s = most_film_frames / film_fps;
     if (length_s === 0) this.say(words.no_stops);
-    else if (length_s > most_s) this.say(words.too_long({ most: duration(most_s), length: duration(length_s) }));
+    else if (length_s > most_s)
+      this.say(words.too_long({ most: duration(most_s), length: duration(length_s) }));
     else return film_eyes(tour, this.tools_.reach());
     return undefined;
   }
@@ -107,7 +136,17 @@ export class FilmPanel {
     const file = `${this.tools_.file_name()}.tum`;
     save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
     const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
-    const command = ['catgs-render', 'frames', '…', '--trace', file, '--fov-deg', fov_deg.toFixed(1), '--out', 'film.mp4'];
+    const command = [
+      'catgs-render',
+      'frames',
+      '…',
+      '--trace',
+      file,
+      '--fov-deg',
+      fov_deg.toFixed(1),
+      '--out',
+      'film.mp4',
+    ];
     this.say(words.path_saved({ command: command.join(' ') }));
   }
 
@@ -121,7 +160,11 @@ export class FilmPanel {
     this.save_.hidden = true;
     this.say('');
     this.make_.disabled = true;
-    const ordered = await order_film(location.href, token, this.tools_.scene_id(), { kind, size, views: write_views(eyes) });
+    const ordered = await order_film(location.href, token, this.tools_.scene_id(), {
+      kind,
+      size,
+      views: write_views(eyes),
+    });
     if ('id' in ordered) await this.watch(ordered.id, name);
     else this.say(words.failed({ why: ordered.why || text.author.unreachable }));
     this.make_.disabled = false;
@@ -138,7 +181,11 @@ export class FilmPanel {
       if (now?.state === 'failed') this.say(words.failed({ why: now.error ?? '' }));
       if (now?.state === 'cancelled') this.say(words.cancelled);
       if (now?.state === 'done') {
-        Object.assign(this.save_, { href: film_address(location.href, id), download: name, hidden: false });
+        Object.assign(this.save_, {
+          href: film_address(location.href, id),
+          download: name,
+          hidden: false,
+        });
         this.say(words.done);
       }
       if (now && now.state !== 'waiting' && now.state !== 'drawing') break;
@@ -156,6 +203,9 @@ export class FilmPanel {
         ? words.waiting
         : seconds_left === undefined
           ? words.drawing
-          : words.drawn({ share: number(share, { style: 'percent' }), time: duration(seconds_left) });
+          : words.drawn({
+              share: number(share, { style: 'percent' }),
+              time: duration(seconds_left),
+            });
   }
 }

@@ -23,7 +23,10 @@ export class AuthorLanguage {
 
   /** Offers the languages of the page, and those that these tours have besides. */
   offer(tours: readonly Tour[]): void {
-    const used = tours.flatMap(({ translations, stops }) => [translations, ...stops.map((stop) => stop.translations)]);
+    const used = tours.flatMap(({ translations, stops }) => [
+      translations,
+      ...stops.map((stop) => stop.translations),
+    ]);
     const tags = new Set<string>([...languages, ...used.flatMap((words) => [...words.keys()])]);
     const chosen = this.choice_.value;
     this.choice_.replaceChildren(

@@ -58,7 +58,11 @@ export class AuthorPanel {
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
     this.about_ = new AuthorAbout((change, field) => this.edit_about(change, field));
-    this.stops_ = new AuthorStops(by_id('author-stops', HTMLOListElement), this.stop_actions(), tools_.media);
+    this.stops_ = new AuthorStops(
+      by_id('author-stops', HTMLOListElement),
+      this.stop_actions(),
+      tools_.media,
+    );
     this.bind();
   }
 
@@ -67,7 +71,11 @@ export class AuthorPanel {
     return {
       stop: (i) => this.draft_.stops[i]!,
       change: (i, change, field) => {
-        this.draft_.change(i, worded(this.draft_.stops[i]!, this.language_.value, change), this.typed_in(field));
+        this.draft_.change(
+          i,
+          worded(this.draft_.stops[i]!, this.language_.value, change),
+          this.typed_in(field),
+        );
         // Typing does not rebuild the fields.
         if (field === undefined) this.edited();
         else this.told();
@@ -87,7 +95,12 @@ export class AuthorPanel {
    * `token`: lets its holder save the sidecar; undefined: this visitor may not save.
    * `made_from`: the tag of the sidecar with these tours.
    */
-  load(tours: readonly Tour[], about: SceneAbout, token: string | undefined, made_from: SidecarTag): void {
+  load(
+    tours: readonly Tour[],
+    about: SceneAbout,
+    token: string | undefined,
+    made_from: SidecarTag,
+  ): void {
     this.token_ = token;
     this.film_?.look();
     this.made_from_ = made_from;
@@ -139,7 +152,10 @@ export class AuthorPanel {
       this.edited(0);
     });
     this.title_.addEventListener('input', () => {
-      draft.edit_tour(worded(draft.tour, this.language_.value, { title: this.title_.value }), this.typed_in('tour'));
+      draft.edit_tour(
+        worded(draft.tour, this.language_.value, { title: this.title_.value }),
+        this.typed_in('tour'),
+      );
       this.told();
     });
     on_click('author-add', () => void this.add());
@@ -168,7 +184,11 @@ export class AuthorPanel {
     const place = by_id('author-film-fields', HTMLElement);
     const { FilmPanel } = await import('./film_panel');
     if (this.film_) return this.film_.look();
-    this.film_ = new FilmPanel(place, { ...this.tools_, tour: () => this.draft_.tour, token: () => this.token_ });
+    this.film_ = new FilmPanel(place, {
+      ...this.tools_,
+      tour: () => this.draft_.tour,
+      token: () => this.token_,
+    });
   }
 
   private async add(): Promise<void> {
@@ -177,7 +197,16 @@ export class AuthorPanel {
     const marker = await this.tools_.place_ahead();
     if (edited !== this.draft_.state.edited) return; // the author went on to another tour
     const title = text.tour.stop_numbered({ n: this.draft_.stops.length + 1 });
-    this.draft_.add({ title, caption: '', ...untranslated, eye, marker, stay_s: undefined, fly_s: undefined, portal: undefined });
+    this.draft_.add({
+      title,
+      caption: '',
+      ...untranslated,
+      eye,
+      marker,
+      stay_s: undefined,
+      fly_s: undefined,
+      portal: undefined,
+    });
     this.edited(this.draft_.stops.length - 1);
     const added = by_id('author-stops', HTMLOListElement).lastElementChild;
     added?.scrollIntoView({ block: 'nearest' });
@@ -265,7 +294,12 @@ export class AuthorPanel {
     const name = `${this.tools_.file_name()}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
     this.saved_ = this.draft_.state;
-    this.say(this.token_ === undefined ? text.author.downloaded({ name }) : text.author.downloaded_too({ name }), this.done_);
+    this.say(
+      this.token_ === undefined
+        ? text.author.downloaded({ name })
+        : text.author.downloaded_too({ name }),
+      this.done_,
+    );
   }
 
   private say(what: string, where = this.said_): void {
@@ -298,7 +332,9 @@ export class AuthorPanel {
     const { tour, editable, state } = this.draft_;
     const words = text.tour;
     this.tour_.replaceChildren(
-      ...editable.map((i, n) => new Option(state.tours[i]!.title || words.numbered({ n: n + 1 }), String(i))),
+      ...editable.map(
+        (i, n) => new Option(state.tours[i]!.title || words.numbered({ n: n + 1 }), String(i)),
+      ),
     );
     this.tour_.value = String(state.edited);
     const { value: language } = this.language_;
@@ -326,6 +362,7 @@ export class AuthorPanel {
     by_id('author-preview', HTMLButtonElement).disabled = stops.length === 0;
     by_id('author-undo', HTMLButtonElement).disabled = !can_undo;
     this.tour_.hidden = by_id('author-delete', HTMLButtonElement).hidden = editable.length < 2;
-    by_id('author-new', HTMLButtonElement).hidden = stops.length === 0 || state.tours.length >= max_tours;
+    by_id('author-new', HTMLButtonElement).hidden =
+      stops.length === 0 || state.tours.length >= max_tours;
   }
 }

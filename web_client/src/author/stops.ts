@@ -12,7 +12,12 @@ export interface MediaFields {
   /** Another scene is edited. `token`: lets its holder add files; undefined: nobody may. */
   use(scene_id: string, token: string | undefined): void;
   /** `n`: its number, as people write it. */
-  of_stop(stop: () => Stop, n: string, language: string, change: (change: Partial<Stop>, field?: string) => void): HTMLElement;
+  of_stop(
+    stop: () => Stop,
+    n: string,
+    language: string,
+    change: (change: Partial<Stop>, field?: string) => void,
+  ): HTMLElement;
   of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement;
 }
 
@@ -46,7 +51,9 @@ export class AuthorStops {
     this.language_ = language;
     const focused = document.activeElement;
     const control =
-      focused instanceof HTMLElement && this.list_.contains(focused) ? focused.dataset['control'] : undefined;
+      focused instanceof HTMLElement && this.list_.contains(focused)
+        ? focused.dataset['control']
+        : undefined;
     this.open_ = Math.min(open, Math.max(0, stops.length - 1));
     this.list_.replaceChildren(...stops.map((stop, i) => this.row_of(stop, i, stops.length)));
     if (control !== undefined) this.focus(control);
@@ -68,7 +75,9 @@ export class AuthorStops {
 
   /** Leads the author to a field of the open stop, and says there what is wrong with it. */
   demand(control: string, why: string): void {
-    const field = this.list_.children[this.open_]?.querySelector<HTMLInputElement>(`[data-control="${control}"]`);
+    const field = this.list_.children[this.open_]?.querySelector<HTMLInputElement>(
+      `[data-control="${control}"]`,
+    );
     const fold = field?.closest('details');
     if (fold) fold.open = true;
     field?.setCustomValidity(why);
@@ -77,8 +86,11 @@ export class AuthorStops {
 
   private row_of(stop: Stop, i: number, count: number): HTMLElement {
     const { actions_: actions } = this;
-    const media = this.media_.of_stop(() => actions.stop(i), number(i + 1), this.language_, (change, field) =>
-      actions.change(i, change, field && `${field} ${i}`),
+    const media = this.media_.of_stop(
+      () => actions.stop(i),
+      number(i + 1),
+      this.language_,
+      (change, field) => actions.change(i, change, field && `${field} ${i}`),
     );
     const item = make('li', {}, ...this.fields_of(stop, i), media, this.buttons_of(stop, i, count));
     item.classList.toggle('open', i === this.open_);
@@ -94,33 +106,65 @@ export class AuthorStops {
     // A translation that is empty is replaced by what stands behind it.
     const behind = this.language_ === '' ? { title: '', caption: words.caption_here } : stop;
     const title = make('input', {
-      value: written.title, maxLength: 200, placeholder: behind.title, ...in_its_own,
+      value: written.title,
+      maxLength: 200,
+      placeholder: behind.title,
+      ...in_its_own,
       'aria-label': words.title({ n }),
     });
     const caption = make('textarea', {
-      value: written.caption, rows: 2, maxLength: max_text_characters, ...in_its_own,
-      placeholder: behind.caption || words.caption_here, 'aria-label': words.caption({ n }),
+      value: written.caption,
+      rows: 2,
+      maxLength: max_text_characters,
+      ...in_its_own,
+      placeholder: behind.caption || words.caption_here,
+      'aria-label': words.caption({ n }),
       title: words.markdown,
     });
-    const seconds = (label: string, value: number | undefined, usual: string, most: number): HTMLInputElement =>
+    const seconds = (
+      label: string,
+      value: number | undefined,
+      usual: string,
+      most: number,
+    ): HTMLInputElement =>
       make('input', {
-        type: 'number', min: '0', max: String(most), step: 'any', placeholder: usual,
-        value: value === undefined ? '' : String(value), 'aria-label': words.of_stop({ field: label, n }),
+        type: 'number',
+        min: '0',
+        max: String(most),
+        step: 'any',
+        placeholder: usual,
+        value: value === undefined ? '' : String(value),
+        'aria-label': words.of_stop({ field: label, n }),
       });
-    const stay = seconds(words.stay, stop.stay_s, String(Math.round(default_stay_s(stop))), longest_stay_s);
+    const stay = seconds(
+      words.stay,
+      stop.stay_s,
+      String(Math.round(default_stay_s(stop))),
+      longest_stay_s,
+    );
     const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);
-    const bind = (field: HTMLInputElement | HTMLTextAreaElement, name: string, read: () => Partial<Stop>): void => {
+    const bind = (
+      field: HTMLInputElement | HTMLTextAreaElement,
+      name: string,
+      read: () => Partial<Stop>,
+    ): void => {
       field.dataset['control'] = name;
       field.addEventListener('input', () => {
         if (field.checkValidity()) this.actions_.change(i, read(), `${name} ${i}`);
       });
     };
-    const number_in = ({ value }: HTMLInputElement): number | undefined => (value === '' ? undefined : Number(value));
+    const number_in = ({ value }: HTMLInputElement): number | undefined =>
+      value === '' ? undefined : Number(value);
     bind(title, 'title', () => ({ title: title.value }));
     bind(caption, 'caption', () => ({ caption: caption.value }));
     bind(stay, 'stay', () => ({ stay_s: number_in(stay) }));
     bind(flight, 'flight', () => ({ fly_s: number_in(flight) }));
-    const times = make('div', {}, make('label', {}, words.flight, flight), make('label', {}, words.stay, stay));
+    const times = make(
+      'div',
+      {},
+      make('label', {}, words.flight, flight),
+      make('label', {}, words.stay, stay),
+    );
     times.className = 'times';
     return [title, caption, times, ...this.portal_of(stop, i, n)];
   }
@@ -131,7 +175,11 @@ export class AuthorStops {
     const now = stop.portal?.scene ?? '';
     if (this.scenes_.length === 0 && now === '') return [];
     const labels = scene_labels(this.scenes_);
-    const options = this.scenes_.map(({ id }, k) => ({ name: this.names_[k]!, id, label: labels[k] ?? id }));
+    const options = this.scenes_.map(({ id }, k) => ({
+      name: this.names_[k]!,
+      id,
+      label: labels[k] ?? id,
+    }));
     const known = options.find(({ name, id }) => now === name || now === id)?.name;
     const choice = make(
       'select',
@@ -144,7 +192,10 @@ export class AuthorStops {
     choice.dataset['control'] = 'portal';
     choice.addEventListener('change', () => {
       const { value: scene } = choice;
-      const portal = scene === '' ? undefined : { scene, view: undefined, tour_index: undefined, stop_index: undefined };
+      const portal =
+        scene === ''
+          ? undefined
+          : { scene, view: undefined, tour_index: undefined, stop_index: undefined };
       this.actions_.change(i, { portal });
     });
     return [make('label', { className: 'leads-to' }, words.leads_to, choice)];
@@ -154,7 +205,13 @@ export class AuthorStops {
     const words = text.author;
     const n = number(i + 1);
     const { actions_: actions } = this;
-    const button = (control: string, name: string, onclick: () => void, sign = name, disabled = false): HTMLElement => {
+    const button = (
+      control: string,
+      name: string,
+      onclick: () => void,
+      sign = name,
+      disabled = false,
+    ): HTMLElement => {
       const said = sign === name ? {} : { 'aria-label': name, title: name };
       const made = make('button', { type: 'button', disabled, onclick, ...said }, sign);
       made.dataset['control'] = control;

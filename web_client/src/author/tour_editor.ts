@@ -30,7 +30,12 @@ export class TourEditor {
     const { navigation, toolbar } = parts_;
     const { camera } = navigation;
     const { player } = tours;
-    const preview = new Preview(player, toolbar, () => navigation.eye, (eye) => navigation.put_back(eye));
+    const preview = new Preview(
+      player,
+      toolbar,
+      () => navigation.eye,
+      (eye) => navigation.put_back(eye),
+    );
     navigation.taken_over.listen(() => preview.forget());
     this.panel_ = new AuthorPanel({
       eye: () => camera.eye,
@@ -55,11 +60,17 @@ export class TourEditor {
   }
 
   /** See AuthorPanel. */
-  load(tours: readonly Tour[], about: SceneAbout, token: string | undefined, made_from: SidecarTag): void {
+  load(
+    tours: readonly Tour[],
+    about: SceneAbout,
+    token: string | undefined,
+    made_from: SidecarTag,
+  ): void {
     this.first_start_ = this.parts_.navigation.camera.start;
     this.panel_.load(tours, about, token, made_from);
   }
 
   /** The scene has this scale from now on. */
-  readonly set_scale = (metres_per_unit: number): void => this.panel_.edit_about({ metres_per_unit });
+  readonly set_scale = (metres_per_unit: number): void =>
+    this.panel_.edit_about({ metres_per_unit });
 }

@@ -182,7 +182,12 @@ export class CameraController {
   /** Flies to where the mode begins, if that is elsewhere. */
   begin_mode(at_once = false): void {
     const to = this.controller.begin();
-    if (to) this.fly_to(to, add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())), at_once);
+    if (to)
+      this.fly_to(
+        to,
+        add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())),
+        at_once,
+      );
   }
 
   /** Turns the scene in the picture, for captures that lie on their side or stand on their head. */
@@ -249,7 +254,11 @@ export class CameraController {
     const { up } = this.rig_;
     const { position, orientation } = this.scene_.start_pose;
     const ahead = add(position, rotate(orientation, forward));
-    this.scene_ = { ...this.scene_, up, start_pose: { position, orientation: look_at(position, ahead, up) } };
+    this.scene_ = {
+      ...this.scene_,
+      up,
+      start_pose: { position, orientation: look_at(position, ahead, up) },
+    };
   }
 
   private follow_flight(dt_s: number): boolean {

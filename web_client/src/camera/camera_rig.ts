@@ -86,7 +86,9 @@ export class CameraRig {
   }
 
   contains(p: Vec3): boolean {
-    return this.unlimited || p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
+    return (
+      this.unlimited || p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9)
+    );
   }
 
   /** Removes the part along up. */

@@ -45,7 +45,11 @@ export class WalkController extends FlyController {
     if (!position) return undefined;
     const rise = Math.min(Math.max(dot(rig.view, rig.up), -steepest_sine), steepest_sine);
     const ahead = add(scale(this.heading, Math.sqrt(1 - rise * rise)), scale(rig.up, rise));
-    return { position, orientation: look_at(position, add(position, ahead), rig.up), fov_y_rad: rig.fov_y_rad };
+    return {
+      position,
+      orientation: look_at(position, add(position, ahead), rig.up),
+      fov_y_rad: rig.fov_y_rad,
+    };
   }
 
   override move(movement: Vec3, climb: number): void {
@@ -79,7 +83,8 @@ export class WalkController extends FlyController {
 
   override dolly(steps: number): void {
     const { ground_: ground } = this;
-    if (ground) this.move(scale(this.heading, steps * eye_heights_per_notch * ground.eye_height), 0);
+    if (ground)
+      this.move(scale(this.heading, steps * eye_heights_per_notch * ground.eye_height), 0);
     else super.dolly(steps);
   }
 

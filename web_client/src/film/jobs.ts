@@ -8,7 +8,11 @@ export interface FilmWish {
 }
 
 /** How the file's name ends, after that of the scene. A picture and a panorama of a scene may lie in one folder. */
-export const film_endings: Readonly<Record<FilmWish['kind'], string>> = { picture: '.png', panorama: '-360.png', film: '.mp4' };
+export const film_endings: Readonly<Record<FilmWish['kind'], string>> = {
+  picture: '.png',
+  panorama: '-360.png',
+  film: '.mp4',
+};
 
 export interface FilmState {
   readonly state: 'waiting' | 'drawing' | 'done' | 'failed' | 'cancelled';
@@ -46,8 +50,11 @@ export async function film_state(page_url: string, id: string): Promise<FilmStat
   }
 }
 
-export const film_address = (page_url: string, id: string): string => new URL(`./api/films/${id}/file`, page_url).href;
+export const film_address = (page_url: string, id: string): string =>
+  new URL(`./api/films/${id}/file`, page_url).href;
 
 export async function cancel_film(page_url: string, id: string): Promise<void> {
-  await ask_server(page_url, '', `films/${id}/cancel`, { method: 'PUT', body: '{}' }).catch(() => undefined);
+  await ask_server(page_url, '', `films/${id}/cancel`, { method: 'PUT', body: '{}' }).catch(
+    () => undefined,
+  );
 }

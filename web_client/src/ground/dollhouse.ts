@@ -53,7 +53,13 @@ export class Dollhouse {
       camera.unlimited = true;
       this.changed.emit(true);
     }
-    const { eye, focus } = dollhouse_eye(this.map_, this.around_, storey, navigation.eye.fov_y_rad, view.clientWidth / Math.max(1, view.clientHeight));
+    const { eye, focus } = dollhouse_eye(
+      this.map_,
+      this.around_,
+      storey,
+      navigation.eye.fov_y_rad,
+      view.clientWidth / Math.max(1, view.clientHeight),
+    );
     camera.fly_to(eye, focus, reduced_motion);
     navigation.loop.wake();
   }
@@ -63,7 +69,10 @@ export class Dollhouse {
     const before = this.end();
     if (!before) return;
     const { navigation, reduced_motion } = this.parts_;
-    const ahead = add(before.eye.position, scale(rotate(before.eye.orientation, forward), navigation.reach));
+    const ahead = add(
+      before.eye.position,
+      scale(rotate(before.eye.orientation, forward), navigation.reach),
+    );
     navigation.camera.fly_to(before.eye, ahead, reduced_motion);
     navigation.loop.wake();
   }
@@ -94,7 +103,10 @@ export class Dollhouse {
   }
 
   private readonly take = ({ x, y, how }: Pointed): boolean => {
-    const stand = how === 'double tap' ? undefined : floor_along(this.map_, this.parts_.navigation.ray_at(x, y));
+    const stand =
+      how === 'double tap'
+        ? undefined
+        : floor_along(this.map_, this.parts_.navigation.ray_at(x, y));
     if (stand) this.parts_.go_to(stand);
     return true;
   };

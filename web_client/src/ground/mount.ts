@@ -120,7 +120,11 @@ export class GroundUse {
     if (map !== this.map_ || this.walking_) return this.walking_;
     const { worker, navigation } = this.parts_;
     this.walking_ = new Walking(
-      { ...this.parts_, timers: browser_timers, announce: (samples) => worker.post({ kind: 'path', samples }) },
+      {
+        ...this.parts_,
+        timers: browser_timers,
+        announce: (samples) => worker.post({ kind: 'path', samples }),
+      },
       map,
     );
     // Where the scene or a link begins with walking, visitors first see what its author has chosen.

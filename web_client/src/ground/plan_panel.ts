@@ -7,7 +7,14 @@ import { text } from '../text/text';
 import type { Stop } from '../tour/tour';
 import { clear_near } from '../walk/map_walker';
 import { height_of } from '../walk/tiles';
-import { cells_per_eye_height, places_at, storey_at, to_grid, type Stand, type WalkMap } from '../walk/walk_map';
+import {
+  cells_per_eye_height,
+  places_at,
+  storey_at,
+  to_grid,
+  type Stand,
+  type WalkMap,
+} from '../walk/walk_map';
 import { stand_below } from '../walk/walker';
 import type { Dollhouse } from './dollhouse';
 import { plan_picture, type PlanPicture } from './plan_picture';
@@ -43,10 +50,22 @@ export class PlanPanel {
   private readonly host_ = by_id('plan-panel', HTMLElement);
   private readonly canvas_ = make('canvas', { role: 'img', 'aria-label': text.ground.plan });
   private readonly picture_ = make('div', { className: 'plan-picture', dir: 'ltr' });
-  private readonly spots_ = make('div', { className: 'plan-stops', role: 'group', 'aria-label': text.page.stops });
+  private readonly spots_ = make('div', {
+    className: 'plan-stops',
+    role: 'group',
+    'aria-label': text.page.stops,
+  });
   private readonly storeys_ = make('select', { 'aria-label': text.ground.storey });
-  private readonly view_up_ = make('button', { type: 'button', title: text.ground.view_up, 'aria-label': text.ground.view_up }, icon('compass'));
-  private readonly house_ = make('button', { type: 'button', title: text.ground.dollhouse, 'aria-label': text.ground.dollhouse }, icon('dollhouse'));
+  private readonly view_up_ = make(
+    'button',
+    { type: 'button', title: text.ground.view_up, 'aria-label': text.ground.view_up },
+    icon('compass'),
+  );
+  private readonly house_ = make(
+    'button',
+    { type: 'button', title: text.ground.dollhouse, 'aria-label': text.ground.dollhouse },
+    icon('dollhouse'),
+  );
   private readonly size_ = make('button', { type: 'button' });
   private readonly pictures_ = new Map<number, DrawnPlan | 'comes'>();
   private storey_ = 0;
@@ -64,10 +83,15 @@ export class PlanPanel {
   ) {
     this.eye_ = eye;
     this.picture_.append(this.canvas_, this.spots_);
-    this.host_.replaceChildren(this.picture_, make('div', { className: 'row' }, this.storeys_, this.house_, this.view_up_, this.size_));
+    this.host_.replaceChildren(
+      this.picture_,
+      make('div', { className: 'row' }, this.storeys_, this.house_, this.view_up_, this.size_),
+    );
     this.storeys_.hidden = map_.storeys.length < 2;
     this.storeys_.append(
-      ...map_.storeys.map((_, k) => new Option(text.ground.storey_numbered({ n: k + 1 }), String(k))).reverse(),
+      ...map_.storeys
+        .map((_, k) => new Option(text.ground.storey_numbered({ n: k + 1 }), String(k)))
+        .reverse(),
     );
     this.storeys_.addEventListener('change', () => {
       this.choose_storey(Number(this.storeys_.value));
@@ -82,7 +106,9 @@ export class PlanPanel {
     });
     this.size_.addEventListener('click', () => this.set_large(!this.is_large));
     this.bind_dollhouse(parts_.dollhouse);
-    this.canvas_.addEventListener('click', ({ offsetX, offsetY }) => this.clicked(offsetX, offsetY));
+    this.canvas_.addEventListener('click', ({ offsetX, offsetY }) =>
+      this.clicked(offsetX, offsetY),
+    );
     new ResizeObserver(() => this.draw_soon()).observe(this.picture_);
     this.set_large(false);
     this.choose_storey(0);
@@ -99,7 +125,8 @@ export class PlanPanel {
   }
 
   show_stops(stops: readonly Stop[], current: number | undefined): void {
-    const is_new = stops.length !== this.stops_.length || stops.some((stop, i) => stop !== this.stops_[i]?.stop);
+    const is_new =
+      stops.length !== this.stops_.length || stops.some((stop, i) => stop !== this.stops_[i]?.stop);
     if (is_new) this.make_stops(stops);
     for (const [i, { button }] of this.stops_.entries()) {
       if (i === current) button.setAttribute('aria-current', 'step');
@@ -111,7 +138,11 @@ export class PlanPanel {
   private make_stops(stops: readonly Stop[]): void {
     this.stops_ = stops.map((stop, i) => {
       const title = stop.title || text.tour.stop_numbered({ n: i + 1 });
-      const button = make('button', { type: 'button', className: 'plan-stop', hidden: true, title, 'aria-label': title }, number(i + 1));
+      const button = make(
+        'button',
+        { type: 'button', className: 'plan-stop', hidden: true, title, 'aria-label': title },
+        number(i + 1),
+      );
       button.addEventListener('click', () => this.parts_.go_to_stop(i));
       return { stop, stand: this.parts_.stand_at(stop.eye.position), button };
     });
@@ -149,7 +180,9 @@ export class PlanPanel {
 
   /** The plan shows the storey that the visitor comes to. Where no ground is below, it stays. */
   private visit_storey(position: Vec3): void {
-    const stand = stand_below(this.map_, position) ?? (this.visitors_storey_ === undefined ? this.parts_.stand_at(position) : undefined);
+    const stand =
+      stand_below(this.map_, position) ??
+      (this.visitors_storey_ === undefined ? this.parts_.stand_at(position) : undefined);
     const storey = stand && storey_at(this.map_, stand.height);
     if (storey === undefined || storey === this.visitors_storey_) return;
     this.visitors_storey_ = storey;
@@ -185,7 +218,9 @@ export class PlanPanel {
   private picture_of(storey: number): DrawnPlan | undefined {
     const known = this.pictures_.get(storey);
     if (!known)
-      this.make_picture(storey).catch((error: unknown) => console.warn('the plan cannot be drawn', error));
+      this.make_picture(storey).catch((error: unknown) =>
+        console.warn('the plan cannot be drawn', error),
+      );
     return known === 'comes' ? undefined : known;
   }
 
@@ -193,7 +228,9 @@ export class PlanPanel {
     this.pictures_.set(storey, 'comes');
     const picture = await plan_picture(this.map_, storey);
     const canvas = make('canvas', { width: picture.width, height: picture.height });
-    canvas.getContext('2d')?.putImageData(new ImageData(picture.rgba, picture.width, picture.height), 0, 0);
+    canvas
+      .getContext('2d')
+      ?.putImageData(new ImageData(picture.rgba, picture.width, picture.height), 0, 0);
     this.pictures_.set(storey, { picture, canvas });
     this.draw_soon();
   }
@@ -218,7 +255,14 @@ export class PlanPanel {
       width_px / (wide * c + deep * s + 2 * margin_cells),
       height_px / (wide * s + deep * c + 2 * margin_cells),
     );
-    return { east: east + wide / 2, north: north + deep / 2, px_per_cell, up_rad, width_px, height_px };
+    return {
+      east: east + wide / 2,
+      north: north + deep / 2,
+      px_per_cell,
+      up_rad,
+      width_px,
+      height_px,
+    };
   }
 
   private draw(): void {
@@ -247,7 +291,8 @@ export class PlanPanel {
     context.scale(scale, scale);
     context.drawImage(plan, 0, 0);
     context.restore();
-    for (const place of this.people_) if (this.is_beside(place)) this.draw_dot(context, view, place, people_colour);
+    for (const place of this.people_)
+      if (this.is_beside(place)) this.draw_dot(context, view, place, people_colour);
     if (this.storey_ === this.visitors_storey_) this.draw_visitor(context, view);
     this.place_stops(view);
   }
@@ -275,7 +320,12 @@ export class PlanPanel {
     this.draw_dot(context, view, this.eye_.position, accent);
   }
 
-  private draw_dot(context: CanvasRenderingContext2D, view: PlanView, place: Vec3, colour: string): void {
+  private draw_dot(
+    context: CanvasRenderingContext2D,
+    view: PlanView,
+    place: Vec3,
+    colour: string,
+  ): void {
     const [east, north] = to_grid(this.map_, place);
     context.beginPath();
     context.arc(...px_of(view, east, north), dot_px, 0, 2 * Math.PI);

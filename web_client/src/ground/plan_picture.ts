@@ -1,7 +1,14 @@
 // The floor plan of a storey as a picture, in the colours of render_core/walk/plan.cpp.
 import { Breaths } from '../base/breaths';
 import { height_of, Kind, kind_of } from '../walk/tiles';
-import { block_around, blocks, clear_at, places_at, storey_at, type WalkMap } from '../walk/walk_map';
+import {
+  block_around,
+  blocks,
+  clear_at,
+  places_at,
+  storey_at,
+  type WalkMap,
+} from '../walk/walk_map';
 
 type Colour = readonly [number, number, number];
 
@@ -26,7 +33,12 @@ export interface PlanPicture {
 /** Higher places cover lower ones. Of the cells of a pixel the darkest counts, so that no wall is lost. */
 export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPicture> {
   const in_storey = (place: number): boolean => storey_at(map, height_of(place)) === storey;
-  const { west, south, east, north } = (await block_around(map, in_storey)) ?? { west: 0, south: 0, east: 1, north: 1 };
+  const { west, south, east, north } = (await block_around(map, in_storey)) ?? {
+    west: 0,
+    south: 0,
+    east: 1,
+    north: 1,
+  };
   const cells = Math.ceil(Math.max(east - west, north - south) / most_px);
   const [width, height] = [Math.ceil((east - west) / cells), Math.ceil((north - south) / cells)];
   const rgba = new Uint8ClampedArray(4 * width * height);
@@ -37,8 +49,12 @@ export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPi
       for (let column = block.west; column < block.east; ++column) {
         const top = places_at(map, column, row).findLast(in_storey);
         if (top === undefined) continue;
-        const [r, g, b] = colours[kind_of(top)] ?? (cells === 1 ? lit(map, column, row, height_of(top)) : level);
-        const at = 4 * ((height - 1 - Math.floor((row - south) / cells)) * width + Math.floor((column - west) / cells));
+        const [r, g, b] =
+          colours[kind_of(top)] ?? (cells === 1 ? lit(map, column, row, height_of(top)) : level);
+        const at =
+          4 *
+          ((height - 1 - Math.floor((row - south) / cells)) * width +
+            Math.floor((column - west) / cells));
         if (rgba[at + 3] !== 0 && rgba[at]! <= r) continue;
         rgba[at] = r;
         rgba[at + 1] = g;

@@ -31,7 +31,13 @@ export class SceneGround {
   async want(idle = false): Promise<void> {
     if (!idle) this.idle_ = false;
     this.tell();
-    if (!this.scene_id_ || this.state_ === 'asked' || this.state_ === 'known' || (idle && this.state_ !== 'unknown')) return;
+    if (
+      !this.scene_id_ ||
+      this.state_ === 'asked' ||
+      this.state_ === 'known' ||
+      (idle && this.state_ !== 'unknown')
+    )
+      return;
     this.idle_ = idle;
     const scene_id = this.scene_id_;
     this.state_ = 'asked';
@@ -69,11 +75,18 @@ export class SceneGround {
 
   private async fetch_file(scene_id: string): Promise<ArrayBuffer | 'large' | undefined> {
     const path = scene_path(scene_id, 'walk');
-    for (const end_ms = Date.now() + patience_ms; Date.now() < end_ms && scene_id === this.scene_id_; ) {
+    for (
+      const end_ms = Date.now() + patience_ms;
+      Date.now() < end_ms && scene_id === this.scene_id_;
+
+    ) {
       const stop = new AbortController();
-      const answer = await ask_server(location.href, this.token_.value, path, { signal: stop.signal });
+      const answer = await ask_server(location.href, this.token_.value, path, {
+        signal: stop.signal,
+      });
       if (answer.status === 200) {
-        if (!this.idle_ || Number(answer.headers.get('content-length') ?? 0) <= most_idle_bytes) return answer.arrayBuffer();
+        if (!this.idle_ || Number(answer.headers.get('content-length') ?? 0) <= most_idle_bytes)
+          return answer.arrayBuffer();
         stop.abort();
         return 'large';
       }

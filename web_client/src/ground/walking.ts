@@ -1,6 +1,17 @@
 // Leads a walking visitor to where they point on the floor, and shows where that is.
 import type { Timers, Clock } from '../base/clock';
-import { add, dot, forward, length, look_at, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
+import {
+  add,
+  dot,
+  forward,
+  length,
+  look_at,
+  normalize,
+  rotate,
+  scale,
+  sub,
+  type Vec3,
+} from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
 import { place_of } from '../camera/ray';
@@ -10,7 +21,13 @@ import { floor_along } from '../walk/floor';
 import { MapWalker } from '../walk/map_walker';
 import { find_path } from '../walk/path';
 import { stroll } from '../walk/stroll';
-import { cells_per_eye_height, eyes_of, to_world, type Stand, type WalkMap } from '../walk/walk_map';
+import {
+  cells_per_eye_height,
+  eyes_of,
+  to_world,
+  type Stand,
+  type WalkMap,
+} from '../walk/walk_map';
 import './ground.css';
 
 const svg = 'http://www.w3.org/2000/svg';
@@ -75,14 +92,22 @@ export class Walking {
     const eye = navigation.eye;
     if (navigation.camera.mode !== 'walk') {
       const position = eyes_of(this.map, to);
-      const duration_s = reduced_motion ? 0 : Math.min(flight_s, length(sub(position, eye.position)) / this.walker.eye_height);
+      const duration_s = reduced_motion
+        ? 0
+        : Math.min(flight_s, length(sub(position, eye.position)) / this.walker.eye_height);
       this.travel(glide(eye, { ...eye, position }, duration_s));
       return;
     }
     navigation.stop_flight();
     this.sought_ = to;
-    const path = await find_path(this.map, this.walker.stand_at(eye.position), to, () => this.sought_ === to);
-    const moved = length(sub(navigation.eye.position, eye.position)) > this.map.radius * this.map.cell;
+    const path = await find_path(
+      this.map,
+      this.walker.stand_at(eye.position),
+      to,
+      () => this.sought_ === to,
+    );
+    const moved =
+      length(sub(navigation.eye.position, eye.position)) > this.map.radius * this.map.cell;
     if (this.sought_ !== to || moved || path.length === 0) return; // no flight through walls either
     const way = stroll(this.map, path, navigation.eye);
     this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
@@ -103,14 +128,21 @@ export class Walking {
     const view = rotate(before.orientation, forward);
     const heading = normalize(sub(view, scale(up, dot(view, up))), north);
     const position = eyes_of(this.map, to);
-    const eye = { position, orientation: look_at(position, add(position, heading), up), fov_y_rad: before.fov_y_rad };
+    const eye = {
+      position,
+      orientation: look_at(position, add(position, heading), up),
+      fov_y_rad: before.fov_y_rad,
+    };
     this.travel(glide(navigation.eye, eye, reduced_motion ? 0 : flight_s));
   }
 
   /** Walks to where a walking visitor clicks on the floor. */
   private take({ x, y, how }: Pointed): boolean {
     const { navigation } = this.parts_;
-    const to = navigation.camera.mode === 'walk' ? floor_along(this.map, navigation.ray_at(x, y)) : undefined;
+    const to =
+      navigation.camera.mode === 'walk'
+        ? floor_along(this.map, navigation.ray_at(x, y))
+        : undefined;
     if (!to) return false;
     if (how === 'double tap') return true; // the first of two clicks leads there
     navigation.taken_over.emit();
@@ -148,7 +180,8 @@ export class Walking {
   private pointed({ pointerType, buttons, offsetX, offsetY }: PointerEvent): void {
     const { view, navigation } = this.parts_;
     if (this.walks_ || pointerType !== 'mouse') return;
-    const shows = buttons === 0 && navigation.camera.mode === 'walk' && !navigation.gestures.has('measure');
+    const shows =
+      buttons === 0 && navigation.camera.mode === 'walk' && !navigation.gestures.has('measure');
     const ray = navigation.ray_at(offsetX / view.clientWidth, offsetY / view.clientHeight);
     this.show(shows ? floor_along(this.map, ray) : undefined);
   }
@@ -162,8 +195,15 @@ export class Walking {
   draw(): void {
     const corners = this.shown_ ? this.corners(this.shown_) : [];
     const inside = corners.every((corner) => corner !== undefined);
-    this.picture_.classList.toggle('shown', corners.length > 0 && inside && this.parts_.navigation.camera.mode === 'walk');
-    if (inside) this.ring_.setAttribute('points', corners.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' '));
+    this.picture_.classList.toggle(
+      'shown',
+      corners.length > 0 && inside && this.parts_.navigation.camera.mode === 'walk',
+    );
+    if (inside)
+      this.ring_.setAttribute(
+        'points',
+        corners.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(' '),
+      );
   }
 
   private corners(stand: Stand): (readonly [number, number] | undefined)[] {

@@ -115,7 +115,9 @@ const long_press_ms = 600;
 
 /** Tells a long press from taps and drags. */
 export class LongPress {
-  private pressed_: { readonly x: number; readonly y: number; readonly cancel: () => void } | undefined;
+  private pressed_:
+    | { readonly x: number; readonly y: number; readonly cancel: () => void }
+    | undefined;
 
   constructor(private readonly timers_: Timers) {}
 
@@ -131,7 +133,8 @@ export class LongPress {
 
   /** The pointer is here. Returns whether a long press may still come; a drag ends it. */
   may_come(x: number, y: number): boolean {
-    if (this.pressed_ && Math.hypot(x - this.pressed_.x, y - this.pressed_.y) > tap_slack_px) this.end();
+    if (this.pressed_ && Math.hypot(x - this.pressed_.x, y - this.pressed_.y) > tap_slack_px)
+      this.end();
     return this.pressed_ !== undefined;
   }
 
@@ -146,7 +149,8 @@ export class LongPress {
  * with ctrl and small deltas.
  */
 export function wheel_steps(delta_y: number, delta_mode: number, ctrl: boolean): number {
-  const px_per_unit = delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
+  const px_per_unit =
+    delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
   const steps = (-delta_y * px_per_unit * (ctrl ? 8 : 1)) / wheel_px_per_step;
   return Math.min(8, Math.max(-8, steps));
 }

@@ -3,7 +3,14 @@ import { browser_timers } from '../base/clock';
 import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
 import { HeldKeys } from './keyboard';
-import { LongPress, Pointers, Taps, wheel_steps, type Pointed, type PointerSample } from './pointers';
+import {
+  LongPress,
+  Pointers,
+  Taps,
+  wheel_steps,
+  type Pointed,
+  type PointerSample,
+} from './pointers';
 
 interface ViewInputListener {
   gesture(gesture: Gesture): void;
@@ -77,7 +84,8 @@ function bind_pointers(
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
         const single = event.pointerType === 'touch' ? 'touch' : 'click';
-        if (what !== 'drag') listener.pointed({ ...place_of(event), how: what === 'tap' ? single : what });
+        if (what !== 'drag')
+          listener.pointed({ ...place_of(event), how: what === 'tap' ? single : what });
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();

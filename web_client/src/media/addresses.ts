@@ -18,7 +18,10 @@ export class MediaAddresses {
 
   async of(src: string): Promise<string> {
     if (is_foreign(src)) return src;
-    const address = server_address(this.page_url_, scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`));
+    const address = server_address(
+      this.page_url_,
+      scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`),
+    );
     if (this.token_) address.searchParams.set('pass', await this.pass());
     return address.href;
   }
@@ -33,7 +36,11 @@ export class MediaAddresses {
   /** Without a pass the server refuses, and the page says that a medium cannot be shown. */
   private async ask(): Promise<string> {
     try {
-      const response = await ask_server(this.page_url_, this.token_, scene_path(this.scene_id_, 'media-pass'));
+      const response = await ask_server(
+        this.page_url_,
+        this.token_,
+        scene_path(this.scene_id_, 'media-pass'),
+      );
       if (response.ok) return await response.text();
     } catch (error) {
       console.warn('the media of the scene cannot be had', error);

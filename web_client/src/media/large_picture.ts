@@ -6,7 +6,13 @@ import type { Medium } from '../tour/media';
 export function show_large(address: string, { alt, language }: Medium): void {
   const close = make('button', { type: 'button', 'aria-label': text.media.close }, '×');
   const words = make('p', { dir: 'auto', lang: language }, alt);
-  const dialog = make('dialog', { id: 'large-picture', 'aria-label': alt }, make('img', { src: address, alt: '' }), words, close);
+  const dialog = make(
+    'dialog',
+    { id: 'large-picture', 'aria-label': alt },
+    make('img', { src: address, alt: '' }),
+    words,
+    close,
+  );
   close.addEventListener('click', () => dialog.close());
   dialog.addEventListener('click', ({ target }) => {
     if (target === dialog) dialog.close(); // beside the picture

@@ -29,7 +29,9 @@ export class MediaPart {
     this.addresses_ = new MediaAddresses(location.href, '', '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
-      voice, background: this.background_, touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive,
+      voice,
+      background: this.background_,
+      touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive,
       storage: browser_storage('localStorage'),
       changed: () => this.update(),
     });
@@ -47,11 +49,14 @@ export class MediaPart {
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     const token = this.token_();
     // Sounds begin again at another address, so an author's edit does not change it.
-    if (this.addresses_for_ !== `${scene_id} ${token}`) this.addresses_ = new MediaAddresses(location.href, token, scene_id);
+    if (this.addresses_for_ !== `${scene_id} ${token}`)
+      this.addresses_ = new MediaAddresses(location.href, token, scene_id);
     this.addresses_for_ = `${scene_id} ${token}`;
     const sounds = ({ sound, stops }: Tour): boolean =>
       sound !== undefined ||
-      stops.some(({ media, narration }) => narration ?? media?.some(({ kind }) => kind !== 'image'));
+      stops.some(
+        ({ media, narration }) => narration ?? media?.some(({ kind }) => kind !== 'image'),
+      );
     this.button_.hidden = !tours.some(sounds);
     this.tour_ = undefined;
   }
@@ -87,7 +92,8 @@ export class MediaPart {
 
   /** The buttons of sounds answer to their own clicks. */
   private touched({ target }: Event): void {
-    if (!(target instanceof Element && target.closest('#button-sound, #tour-voice'))) this.sounds_.touch();
+    if (!(target instanceof Element && target.closest('#button-sound, #tour-voice')))
+      this.sounds_.touch();
   }
 
   private update(): void {
@@ -95,7 +101,9 @@ export class MediaPart {
     const label = audible ? text.media.mute : text.media.sound_on;
     this.button_.setAttribute('aria-label', label);
     this.button_.title = label;
-    this.button_.querySelector('use')?.setAttribute('href', audible ? '#icon-sound' : '#icon-muted');
+    this.button_
+      .querySelector('use')
+      ?.setAttribute('href', audible ? '#icon-sound' : '#icon-muted');
     this.media_.mute(muted);
     this.narrator_.update();
   }

@@ -17,7 +17,11 @@ export class MediaShelf {
 
   async look(): Promise<void> {
     try {
-      const response = await ask_server(location.href, this.token_, scene_path(this.scene_id, 'media'));
+      const response = await ask_server(
+        location.href,
+        this.token_,
+        scene_path(this.scene_id, 'media'),
+      );
       if (!response.ok) return;
       const { media } = (await response.json()) as { media: readonly { readonly name: string }[] };
       this.names = media.map(({ name }) => name);
@@ -35,7 +39,9 @@ export class MediaShelf {
     if (file.size > max_media_bytes) throw new Error(text.media.too_large);
     const name = free_name(file.name, this.names);
     const path = scene_path(this.scene_id, `media/${encodeURIComponent(name)}`);
-    await send(server_address(location.href, path), this.token_, file, (share) => progress(text.media.sending({ share: number(share, { style: 'percent' }) })));
+    await send(server_address(location.href, path), this.token_, file, (share) =>
+      progress(text.media.sending({ share: number(share, { style: 'percent' }) })),
+    );
     this.names = [...this.names, name].sort();
     return name;
   }
@@ -44,7 +50,12 @@ export class MediaShelf {
 /** A name that the server takes and that no other file has. Pure. */
 export function free_name(wish: string, taken: readonly string[]): string {
   const dot = wish.lastIndexOf('.');
-  const plain = (part: string): string => part.normalize('NFKD').replace(/\p{M}/gu, '').replace(/[^\w-]+/g, '-').replace(/^-+|-+$/g, '');
+  const plain = (part: string): string =>
+    part
+      .normalize('NFKD')
+      .replace(/\p{M}/gu, '')
+      .replace(/[^\w-]+/g, '-')
+      .replace(/^-+|-+$/g, '');
   const stem = plain(dot > 0 ? wish.slice(0, dot) : wish).slice(0, 80) || 'file';
   const extension = dot > 0 ? `.${plain(wish.slice(dot + 1)).toLowerCase()}` : '';
   const there = new Set(taken.map((name) => name.toLowerCase()));
@@ -55,7 +66,12 @@ export function free_name(wish: string, taken: readonly string[]): string {
 }
 
 /** fetch() does not tell how much is sent. */
-function send(address: URL, token: string, file: File, sent: (share: number) => void): Promise<void> {
+function send(
+  address: URL,
+  token: string,
+  file: File,
+  sent: (share: number) => void,
+): Promise<void> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('PUT', address);
@@ -67,7 +83,8 @@ function send(address: URL, token: string, file: File, sent: (share: number) => 
       if (status === 200) resolve();
       else reject(new Error(text.media.not_kept({ why: refusal(status, answer) })));
     };
-    request.onerror = () => reject(new Error(text.media.not_kept({ why: text.author.unreachable })));
+    request.onerror = () =>
+      reject(new Error(text.media.not_kept({ why: text.author.unreachable })));
     request.send(file);
   });
 }

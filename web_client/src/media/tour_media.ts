@@ -70,7 +70,12 @@ export class TourMediaFields implements MediaFields {
     this.fields_?.use(scene_id, token);
   }
 
-  of_stop(stop: () => Stop, n: string, language: string, change: (change: Partial<Stop>, field?: string) => void): HTMLElement {
+  of_stop(
+    stop: () => Stop,
+    n: string,
+    language: string,
+    change: (change: Partial<Stop>, field?: string) => void,
+  ): HTMLElement {
     return this.filled((fields) => fields.of_stop(stop, n, language, change));
   }
 
@@ -81,13 +86,16 @@ export class TourMediaFields implements MediaFields {
   private filled(fill: (fields: AuthorMedia) => HTMLElement): HTMLElement {
     if (this.fields_) return fill(this.fields_);
     const slot = make('div');
-    void import('./author_media').then(({ AuthorMedia: Fields }) => {
-      if (!this.fields_) {
-        this.fields_ = new Fields();
-        this.fields_.use(...this.scene_);
-      }
-      slot.replaceWith(fill(this.fields_));
-    }, (error: unknown) => console.warn('media cannot be edited', error));
+    void import('./author_media').then(
+      ({ AuthorMedia: Fields }) => {
+        if (!this.fields_) {
+          this.fields_ = new Fields();
+          this.fields_.use(...this.scene_);
+        }
+        slot.replaceWith(fill(this.fields_));
+      },
+      (error: unknown) => console.warn('media cannot be edited', error),
+    );
     return slot;
   }
 }

@@ -52,7 +52,8 @@ export function hint_at_more(element: HTMLElement): () => void {
   const look = (): void => {
     const hidden_px = element.scrollHeight - element.clientHeight;
     element.classList.toggle('more-below', hidden_px - element.scrollTop > 1);
-    if (hidden_px > 1 && !element.querySelector('button, input, select, textarea, a')) element.tabIndex = 0;
+    if (hidden_px > 1 && !element.querySelector('button, input, select, textarea, a'))
+      element.tabIndex = 0;
     else element.removeAttribute('tabindex');
   };
   element.addEventListener('scroll', look, { passive: true });

@@ -135,7 +135,12 @@ export class Navigation {
   async stand_here(): Promise<boolean> {
     const d = 0.04; // shares of the view: far enough apart for a direction, near enough for one surface
     const found = await Promise.all(
-      [[-d, 0], [d, 0], [0, -d], [0, d]].map(([x, y]) => this.place_at(0.5 + x!, 0.5 + y!)),
+      [
+        [-d, 0],
+        [d, 0],
+        [0, -d],
+        [0, d],
+      ].map(([x, y]) => this.place_at(0.5 + x!, 0.5 + y!)),
     );
     const floor = surface_of(found, this.eye.position);
     if (!floor) return false;
@@ -282,6 +287,11 @@ export class Navigation {
 
   /** `x`, `y`: as in Pointed. */
   ray_at(x: number, y: number): Ray {
-    return ray_through(this.eye, x, y, this.view_.clientWidth / Math.max(1, this.view_.clientHeight));
+    return ray_through(
+      this.eye,
+      x,
+      y,
+      this.view_.clientWidth / Math.max(1, this.view_.clientHeight),
+    );
   }
 }

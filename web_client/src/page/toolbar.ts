@@ -68,7 +68,7 @@ export class Toolbar {
       KeyH: () => this.toggle('help'),
       Escape: () => this.close_all(),
     };
-    const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, '_': -2 };
+    const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, _: -2 };
     window.addEventListener('keydown', (event) => {
       if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
       if (this.watching && !(event.code in { KeyF: 1, KeyI: 1, Escape: 1 })) return;

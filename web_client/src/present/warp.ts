@@ -57,7 +57,15 @@ export interface Sides {
 /** How far the view reaches from the middle of the picture: 1 is the border, and 4 the most returned. */
 export function reach(m: Matrix3): Sides {
   let [x_most, y_most] = [0, 0];
-  for (const [x, y] of probes.flatMap((v) => [[v, -1], [v, 1], [-1, v], [1, v]] as const)) {
+  for (const [x, y] of probes.flatMap(
+    (v) =>
+      [
+        [v, -1],
+        [v, 1],
+        [-1, v],
+        [1, v],
+      ] as const,
+  )) {
     const at = warped(m, x, y);
     x_most = Math.max(x_most, at ? Math.abs(at[0]) : farthest);
     y_most = Math.max(y_most, at ? Math.abs(at[1]) : farthest);

@@ -246,7 +246,12 @@ export class Session {
       case 'queue':
         if (link === this.link_) {
           const { position, estimateS, forScene } = body.value;
-          this.listener_.state({ phase: 'queued', position, estimate_s: estimateS, for_scene: forScene });
+          this.listener_.state({
+            phase: 'queued',
+            position,
+            estimate_s: estimateS,
+            for_scene: forScene,
+          });
         }
         break;
       case 'stats':
@@ -388,7 +393,9 @@ function path_ahead(path: readonly PoseInit[], now_us: number): { path?: { sampl
 
 /** Whether an error refuses a scene. */
 const shuts_out = (code: Error_Code): boolean =>
-  code === Error_Code.UNKNOWN_SCENE || code === Error_Code.UNAUTHORIZED || code === Error_Code.SERVER_FULL;
+  code === Error_Code.UNKNOWN_SCENE ||
+  code === Error_Code.UNAUTHORIZED ||
+  code === Error_Code.SERVER_FULL;
 
 /** Whether there was nobody to watch. */
 const lacks_leader = (code: Error_Code): boolean =>

@@ -14,11 +14,15 @@ interface Plural {
 }
 
 /** The names in braces. */
-type Names<T extends string> = T extends `${string}{${infer Name}}${infer Rest}` ? Name | Names<Rest> : never;
+type Names<T extends string> = T extends `${string}{${infer Name}}${infer Rest}`
+  ? Name | Names<Rest>
+  : never;
 
 type Values<T extends string> = Readonly<Record<Names<T>, string | number>>;
 
-type Message<T extends string> = [Names<T>] extends [never] ? string : (values: Values<T>) => string;
+type Message<T extends string> = [Names<T>] extends [never]
+  ? string
+  : (values: Values<T>) => string;
 
 /** The texts of a catalogue. A text with values is a function of them. */
 export type Messages<T> = {
@@ -31,11 +35,19 @@ export type Messages<T> = {
 
 /** The keys of `T`, with any texts: what translations are typed against. */
 export type Translation<T> = {
-  readonly [K in keyof T]: T[K] extends string ? string : T[K] extends Plural ? Plural : Translation<T[K]>;
+  readonly [K in keyof T]: T[K] extends string
+    ? string
+    : T[K] extends Plural
+      ? Plural
+      : Translation<T[K]>;
 };
 
 /** `language`: of the catalogue. `locale`: in which numbers are written. */
-export function messages<T extends Catalogue>(catalogue: T, language: string, locale: string): Messages<T> {
+export function messages<T extends Catalogue>(
+  catalogue: T,
+  language: string,
+  locale: string,
+): Messages<T> {
   const rules = new Intl.PluralRules(language);
   const numbers = new Intl.NumberFormat(locale);
   type Given = Readonly<Record<string, string | number>>;
@@ -47,7 +59,8 @@ export function messages<T extends Catalogue>(catalogue: T, language: string, lo
     });
 
   const message_of = (node: string | Catalogue): unknown => {
-    if (typeof node === 'string') return node.includes('{') ? (values: Given) => fill(node, values) : node;
+    if (typeof node === 'string')
+      return node.includes('{') ? (values: Given) => fill(node, values) : node;
     const { other } = node;
     if (typeof other !== 'string') return messages_of(node);
     const forms = node as Readonly<Record<string, string>>;

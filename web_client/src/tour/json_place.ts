@@ -29,7 +29,8 @@ export class JsonPlace {
 
   elements(most: number): JsonPlace[] {
     if (!Array.isArray(this.value_)) this.fail(mistakes.not_a_list);
-    if (this.value_.length > most) this.fail(mistakes.too_many({ count: this.value_.length, most }));
+    if (this.value_.length > most)
+      this.fail(mistakes.too_many({ count: this.value_.length, most }));
     return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
   }
 

@@ -47,7 +47,9 @@ const extensions: Readonly<Record<MediaKind | 'captions', readonly string[]>> = 
 /** What the extension of a name or an address promises; undefined: nothing that is known. */
 export function kind_of(src: string): MediaKind | 'captions' | undefined {
   const extension = /\.(\w+)(?:[?#].*)?$/.exec(src)?.[1]?.toLowerCase() ?? '';
-  return ([...media_kinds, 'captions'] as const).find((kind) => extensions[kind].includes(extension));
+  return ([...media_kinds, 'captions'] as const).find((kind) =>
+    extensions[kind].includes(extension),
+  );
 }
 
 /** For file choosers: ".jpg,.jpeg,…". */
@@ -65,7 +67,8 @@ function read_source(place: JsonPlace): { src: string; kind: MediaKind } {
   const src = source.text();
   if (!is_foreign(src) && !/^[\w-][\w.-]{0,99}$/.test(src)) source.fail(mistakes.no_media_name);
   const written = place.find('type');
-  const kind = written === undefined ? kind_of(src) : media_kinds.find((name) => name === written.text());
+  const kind =
+    written === undefined ? kind_of(src) : media_kinds.find((name) => name === written.text());
   if (kind !== undefined && kind !== 'captions') return { src, kind };
   return (written ?? source).fail(mistakes.no_media_kind);
 }
@@ -73,7 +76,8 @@ function read_source(place: JsonPlace): { src: string; kind: MediaKind } {
 function read_captions(place: JsonPlace): string {
   const captions = place.find('captions');
   const name = captions?.text() ?? '';
-  if (captions && (is_foreign(name) || kind_of(name) !== 'captions')) captions.fail(mistakes.no_captions);
+  if (captions && (is_foreign(name) || kind_of(name) !== 'captions'))
+    captions.fail(mistakes.no_captions);
   return name;
 }
 
@@ -82,7 +86,9 @@ export const read_media = (media: JsonPlace | undefined): readonly Medium[] | un
     const { src, kind } = read_source(place);
     const alt = (kind === 'image' ? place.at('alt') : place.find('alt'))?.text() ?? '';
     const translations = place.find('translations')?.members(max_languages) ?? [];
-    const alt_in = new Map(translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']));
+    const alt_in = new Map(
+      translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']),
+    );
     return { src, kind, alt, alt_in, language: '', captions: read_captions(place) };
   });
 
@@ -99,19 +105,27 @@ export const read_tour_sound = (place: JsonPlace | undefined): TourSound | undef
   place && { src: read_sound(place), volume: place.find('volume')?.number(0, 1) ?? usual_volume };
 
 /** The media as a visitor reads of them, in the first of these languages that each has. */
-export const media_for = (media: readonly Medium[], readers: readonly string[]): readonly Medium[] =>
+export const media_for = (
+  media: readonly Medium[],
+  readers: readonly string[],
+): readonly Medium[] =>
   media.map((medium) => {
     const language = tag_for([...medium.alt_in.keys()], readers);
     const alt = language === undefined ? '' : medium.alt_in.get(language);
     return language !== undefined && alt ? { ...medium, alt, language } : medium;
   });
 
-const write_source = (src: string, kind: MediaKind): object => ({ src, ...(kind_of(src) !== kind && { type: kind }) });
+const write_source = (src: string, kind: MediaKind): object => ({
+  src,
+  ...(kind_of(src) !== kind && { type: kind }),
+});
 
 /** Writes what read_media() reads. */
 export const write_media = (media: readonly Medium[]): unknown[] =>
   media.map(({ src, kind, alt, alt_in, captions }) => {
-    const translations = [...alt_in].flatMap(([tag, words]) => (words ? [[tag, { alt: words }] as const] : []));
+    const translations = [...alt_in].flatMap(([tag, words]) =>
+      words ? [[tag, { alt: words }] as const] : [],
+    );
     return {
       ...write_source(src, kind),
       ...(alt && { alt }),

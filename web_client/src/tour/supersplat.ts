@@ -87,7 +87,13 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
     },
     up,
   );
-  return { title: track.find('name')?.text() ?? '', ...untranslated, stops: [], way, starts_itself };
+  return {
+    title: track.find('name')?.text() ?? '',
+    ...untranslated,
+    stops: [],
+    way,
+    starts_itself,
+  };
 }
 
 /** Throws an error that names the place it cannot read. `aspect`: width over height of the view. */
@@ -103,7 +109,9 @@ export function read_supersplat(document: unknown, aspect: number): ImportedTour
     return read_track(track, aspect, mode === 'animTrack' && i === 0) ?? [];
   });
   const annotated: Tour[] =
-    stops.length > 0 ? [{ title: '', ...untranslated, stops, way: undefined, starts_itself: false }] : [];
+    stops.length > 0
+      ? [{ title: '', ...untranslated, stops, way: undefined, starts_itself: false }]
+      : [];
   const camera = list('cameras')[0];
   const first = mode === 'annotation' ? stops[0]?.eye : undefined;
   return {

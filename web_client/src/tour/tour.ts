@@ -61,7 +61,8 @@ export interface Tour extends Worded {
 
 /** Whether a tour shows or plays more than words. */
 export const has_media = ({ sound, stops }: Tour): boolean =>
-  sound !== undefined || stops.some(({ media, narration }) => narration !== undefined || (media ?? []).length > 0);
+  sound !== undefined ||
+  stops.some(({ media, narration }) => narration !== undefined || (media ?? []).length > 0);
 
 /** Time that a visitor needs to look around and to read. */
 export function default_stay_s(stop: Stop): number {
@@ -110,7 +111,10 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
 
 /** For places without `look_at`. */
 const orientation_of = (place: JsonPlace): Quat =>
-  (place.find('orientation') ?? place.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))).orientation();
+  (
+    place.find('orientation') ??
+    place.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))
+  ).orientation();
 
 function read_portal(portal: JsonPlace | undefined): Portal | undefined {
   if (!portal) return undefined;
@@ -144,7 +148,10 @@ function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'lang
 export const tours_for = (tours: readonly Tour[], readers: readonly string[]): readonly Tour[] =>
   tours.map((tour) => ({
     ...in_language(tour, readers),
-    stops: tour.stops.map((stop) => ({ ...in_language(stop, readers), media: stop.media && media_for(stop.media, readers) })),
+    stops: tour.stops.map((stop) => ({
+      ...in_language(stop, readers),
+      media: stop.media && media_for(stop.media, readers),
+    })),
   }));
 
 const short = (v: number): number => Number(v.toPrecision(7));
@@ -192,7 +199,9 @@ function write_portal({ scene, view, tour_index, stop_index }: Portal): object {
 
 function write_translations(translations: Worded['translations']): object {
   const written = [...translations].flatMap(([tag, { title, caption }]) =>
-    title || caption ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const] : [],
+    title || caption
+      ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const]
+      : [],
   );
   return written.length > 0 ? { translations: Object.fromEntries(written) } : {};
 }

@@ -19,7 +19,12 @@ interface EmbedTarget {
 type EmbedNews =
   | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
   | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
-  | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };
+  | {
+      readonly catgs: 'pose';
+      readonly position: readonly number[];
+      readonly orientation: readonly number[];
+      readonly fov_deg: number;
+    };
 
 export class EmbedApi {
   private origin_: string | undefined; // origin of the parent, once it has spoken

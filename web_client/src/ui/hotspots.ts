@@ -82,10 +82,19 @@ export class Hotspots {
 }
 
 /** Where it leads or its title, and its caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
-function label_of(stop: Stop, index: number, button: HTMLButtonElement, leads_to: string | undefined): HTMLElement {
+function label_of(
+  stop: Stop,
+  index: number,
+  button: HTMLButtonElement,
+  leads_to: string | undefined,
+): HTMLElement {
   const title = leads_to ?? (stop.title || text.tour.stop_numbered({ n: index + 1 }));
   const lang = stop.title && !leads_to ? stop.language : language;
-  const label = make('span', { className: 'hotspot-label', dir: 'auto', lang }, make('span', { className: 'hotspot-name' }, title));
+  const label = make(
+    'span',
+    { className: 'hotspot-label', dir: 'auto', lang },
+    make('span', { className: 'hotspot-name' }, title),
+  );
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
     const id = `hotspot-caption-${index}`;

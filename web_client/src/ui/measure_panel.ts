@@ -33,7 +33,8 @@ export class MeasurePanel {
     this.lines_.id = 'measure-lines';
     this.lines_.setAttribute('aria-hidden', 'true');
     by_id('hotspots', HTMLElement).before(this.lines_);
-    this.system_.value = systems.find((system) => system === storage?.getItem(system_key)) ?? system_here();
+    this.system_.value =
+      systems.find((system) => system === storage?.getItem(system_key)) ?? system_here();
     this.system_.addEventListener('change', () => {
       storage?.setItem(system_key, this.system_.value);
       this.show();
@@ -97,10 +98,15 @@ export class MeasurePanel {
       rows.push([text.measure.height, written(rise_of(marks, up), scale)]);
     }
     if (marks.length >= 3) rows.push([text.measure.area, written(area_of(marks), scale, 2)]);
-    const cells = rows.flatMap(([name, value]) => [make('dt', {}, name), make('dd', { dir: 'ltr' }, value)]);
+    const cells = rows.flatMap(([name, value]) => [
+      make('dt', {}, name),
+      make('dd', { dir: 'ltr' }, value),
+    ]);
     const hint = scale.metres_per_unit ? [] : [make('p', {}, text.measure.no_scale)];
     this.results_.replaceChildren(
-      ...(rows.length > 0 ? [make('dl', {}, ...cells), ...hint] : [make('p', {}, text.measure.hint)]),
+      ...(rows.length > 0
+        ? [make('dl', {}, ...cells), ...hint]
+        : [make('p', {}, text.measure.hint)]),
     );
     by_id('measure-undo', HTMLButtonElement).disabled = marks.length === 0;
     by_id('measure-clear', HTMLButtonElement).disabled = marks.length === 0;
@@ -122,7 +128,9 @@ export class MeasurePanel {
   private draw(eye: Eye): void {
     if (this.marks_.length === 0 && !this.lines_.firstChild) return;
     const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
-    const places = this.marks_.map(({ point }) => place_of(point, eye, width_px / Math.max(1, height_px)));
+    const places = this.marks_.map(({ point }) =>
+      place_of(point, eye, width_px / Math.max(1, height_px)),
+    );
     const drawn = places.flatMap((place, i) => {
       if (!place) return []; // behind the camera
       const [x, y] = [place[0] * width_px, place[1] * height_px].map((px) => px.toFixed(1));

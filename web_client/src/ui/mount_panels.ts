@@ -16,5 +16,7 @@ export function mount_panels(
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
   new MeasurePanel({ ...parts, set_scale });
-  navigation.speed_chosen.listen((speed) => notice.show(text.quality.speed_now({ factor: factor(speed) }), 2));
+  navigation.speed_chosen.listen((speed) =>
+    notice.show(text.quality.speed_now({ factor: factor(speed) }), 2),
+  );
 }

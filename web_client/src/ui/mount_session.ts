@@ -36,7 +36,9 @@ export function mount_session(
   if (scene_id) void poster.show(location.href, scene_id, token.value);
 
   const rung = remembered_rung(storage, navigator.userAgent, Date.now());
-  worker.on('rung', ({ rung: proved }) => remember_rung(proved, storage, navigator.userAgent, Date.now()));
+  worker.on('rung', ({ rung: proved }) =>
+    remember_rung(proved, storage, navigator.userAgent, Date.now()),
+  );
   // Visitors hear what it means to them, and the console has the reason.
   const tell_of_jpeg = (why: string): void => {
     console.warn(why);

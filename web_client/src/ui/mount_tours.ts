@@ -22,7 +22,9 @@ export function mount_tours(
   const travel = new PortalTravel(parts, () => views.present);
   tours.portal_taken.listen(({ scene_id, portal }) => travel.enter(portal, scene_id));
   const is_author = new URLSearchParams(location.search).has('author');
-  const editor = is_author ? new TourEditor(parts, tours, () => scenes.list(), media_fields) : undefined;
+  const editor = is_author
+    ? new TourEditor(parts, tours, () => scenes.list(), media_fields)
+    : undefined;
   new SharePanel(parts, () => views.address);
   const { player } = tours;
   const embed = new EmbedApi({
@@ -35,7 +37,9 @@ export function mount_tours(
     pause: () => player.pause(),
     reset: () => navigation.reset(),
   });
-  tours.shown.listen(({ stop_index, playing }) => embed.say({ catgs: 'stop', stop: stop_index ?? null, playing }));
+  tours.shown.listen(({ stop_index, playing }) =>
+    embed.say({ catgs: 'stop', stop: stop_index ?? null, playing }),
+  );
   new SceneEntry(parts, { scenes, tours, views, travel, editor, embed });
   return { tours, set_scale: editor?.set_scale };
 }

@@ -24,10 +24,17 @@ export class Pointing {
   private eye_: Eye | undefined; // of the picture that the visitor sees
   private picture_aspect_ = 0;
 
-  constructor(private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice' | 'seen'>) {
+  constructor(
+    private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice' | 'seen'>,
+  ) {
     const { worker, seen } = parts_;
-    worker.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader({ name }) : words.by_other));
-    worker.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
+    worker.on('pinged', ({ place, by_leader, name }) =>
+      this.show(place, by_leader ? words.by_leader({ name }) : words.by_other),
+    );
+    worker.on(
+      'config',
+      ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)),
+    );
     seen.moved.listen((eye) => this.see(eye));
     on_click('company-point', () => void this.point_at(0.5, 0.5));
   }
@@ -74,7 +81,8 @@ export class Pointing {
     // The ring tells all others.
     by_id('company-said', HTMLElement).textContent = inside ? said : `${said}. ${words.aside}`;
     setTimeout(() => {
-      if (this.shown_[this.shown_.length - 1] === shown) by_id('company-said', HTMLElement).textContent = '';
+      if (this.shown_[this.shown_.length - 1] === shown)
+        by_id('company-said', HTMLElement).textContent = '';
       ring.remove();
       this.shown_ = this.shown_.filter((other) => other !== shown);
     }, shown_ms);

@@ -12,7 +12,9 @@ export class PortalScenes {
   private scenes_for_ = '';
   private readonly prepared_ms_ = new Map<string, number>();
 
-  constructor(private readonly parts_: { readonly worker: WorkerClient; readonly token: AccessToken }) {}
+  constructor(
+    private readonly parts_: { readonly worker: WorkerClient; readonly token: AccessToken },
+  ) {}
 
   /** Learns which scenes this visitor may enter, where a tour leads to one. */
   async learn(tours: readonly Tour[]): Promise<void> {
@@ -37,7 +39,8 @@ export class PortalScenes {
   prepare(portal: Portal): void {
     const { scene_id } = this.target_of(portal);
     const now_ms = performance.now();
-    if (!scene_id || now_ms - (this.prepared_ms_.get(scene_id) ?? -Infinity) < prepare_again_ms) return;
+    if (!scene_id || now_ms - (this.prepared_ms_.get(scene_id) ?? -Infinity) < prepare_again_ms)
+      return;
     this.prepared_ms_.set(scene_id, now_ms);
     this.parts_.worker.post({ kind: 'prepare', scene_id });
   }

@@ -31,7 +31,8 @@ export class PortalTravel {
       if (this.awaited_ === undefined) return;
       // The server does not draw a pose again that gives the same picture.
       const { camera } = navigation;
-      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene?.near_z ?? 0)) this.uncover();
+      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene?.near_z ?? 0))
+        this.uncover();
     });
     window.addEventListener('popstate', () => {
       if (this.leads_elsewhere) void this.go(undefined, this.address_scene);
@@ -77,7 +78,12 @@ export class PortalTravel {
     const { navigation, worker } = this.parts_;
     navigation.taken_over.emit();
     // The way back through a portal leads to this view.
-    if (by) history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
+    if (by)
+      history.replaceState(
+        null,
+        '',
+        address_in(location.href, navigation.scene_id, this.present_()),
+      );
     this.going_ = { by, scene_id };
     this.awaited_ = undefined;
     clearTimeout(this.cover_ends_);
@@ -90,7 +96,11 @@ export class PortalTravel {
     const { navigation, notice } = this.parts_;
     if (why) notice.show(why, 20);
     if (this.going_ && !this.going_.by)
-      history.replaceState(null, '', address_in(location.href, navigation.scene_id, this.present_()));
+      history.replaceState(
+        null,
+        '',
+        address_in(location.href, navigation.scene_id, this.present_()),
+      );
     this.going_ = undefined;
     this.uncover();
   }

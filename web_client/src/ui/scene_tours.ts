@@ -51,7 +51,9 @@ export class SceneTours {
       (state) => this.show(state),
     );
     const { player } = this;
-    this.view_ = new TourView(player, scenes_, (portal, scene_id) => this.portal_taken.emit({ portal, scene_id }));
+    this.view_ = new TourView(player, scenes_, (portal, scene_id) =>
+      this.portal_taken.emit({ portal, scene_id }),
+    );
     this.hotspots_ = new Hotspots(view, seen, scenes_, (stop) => player.go_to(stop));
     navigation.taken_over.listen(() => player.pause());
     navigation.went_back.listen(() => player.leave()); // what is shown is no stop any more

@@ -43,7 +43,9 @@ export class SharePanel {
       this.frames_.hidden = sites === undefined;
       if (sites) {
         this.frames_.textContent =
-          sites.length === 0 ? words.share.no_frames : words.share.frames({ sites: sites.join(', ') });
+          sites.length === 0
+            ? words.share.no_frames
+            : words.share.frames({ sites: sites.join(', ') });
       }
     } catch (error) {
       console.warn('the server did not say who may show this page', error); // the server is away

@@ -87,11 +87,19 @@ export class StatsCharts {
     const up_to =
       (last: Stage) =>
       ({ stages_ms }: StatsSnapshot): number =>
-        sum(stages.slice(0, stages.indexOf(last) + 1).map((stage) => stages_ms[stage]).filter(Number.isFinite));
+        sum(
+          stages
+            .slice(0, stages.indexOf(last) + 1)
+            .map((stage) => stages_ms[stage])
+            .filter(Number.isFinite),
+        );
     return {
       plot: this.plot(
         operator.plots.latency,
-        drawn.map((stage) => ({ ...line(operator.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
+        drawn.map((stage) => ({
+          ...line(operator.stages[stage].label, colours[stage], 'y'),
+          fill: colours[stage],
+        })),
         [axis(this.host_, operator.units.milliseconds)],
       ),
       data: (history) => drawn.map((stage) => history.column(up_to(stage))),
@@ -104,9 +112,19 @@ export class StatsCharts {
       plot: this.plot(
         operator.plots.rates,
         [line(operator.plots.fps, '#4b7bd6', 'y'), line(operator.plots.bitrate, '#e07a3f', 'bits')],
-        [axis(this.host_, operator.units.fps), axis(this.host_, operator.units.megabits, { side: 1, scale: 'bits', grid: { show: false } })],
+        [
+          axis(this.host_, operator.units.fps),
+          axis(this.host_, operator.units.megabits, {
+            side: 1,
+            scale: 'bits',
+            grid: { show: false },
+          }),
+        ],
       ),
-      data: (history) => [history.column((s) => s.fps_shown), history.column((s) => s.bitrate_kbps / 1000)],
+      data: (history) => [
+        history.column((s) => s.fps_shown),
+        history.column((s) => s.bitrate_kbps / 1000),
+      ],
     };
   }
 

@@ -37,15 +37,29 @@ export class StatsPanel {
       list.append(make('dt', { title: title ?? '' }, label), make('dd', {}, value));
       this.values_.push(value);
     }
-    const save = make('button', { type: 'button', onclick: () => this.save() }, operator.stats.save);
-    const in_english = make('div', { lang: 'en', dir: 'ltr' }, this.rest_, list, this.plots_, this.about_, save);
+    const save = make(
+      'button',
+      { type: 'button', onclick: () => this.save() },
+      operator.stats.save,
+    );
+    const in_english = make(
+      'div',
+      { lang: 'en', dir: 'ltr' },
+      this.rest_,
+      list,
+      this.plots_,
+      this.about_,
+      save,
+    );
     by_id('stats-panel', HTMLElement).append(in_english);
     worker_.on('welcome', ({ welcome }) => {
       this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
     });
     worker_.on('config', ({ config }) => this.show_facts({ encoder: config.encoder }));
     worker_.on('presenter', ({ presenter, warp, overscan }) => {
-      this.show_facts({ presenter: `${operator.presenters[presenter]} · ${operator.warp[warp]}${overscan_text(overscan)}` });
+      this.show_facts({
+        presenter: `${operator.presenters[presenter]} · ${operator.warp[warp]}${overscan_text(overscan)}`,
+      });
     });
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'stats') this.watch(shown);
@@ -110,5 +124,7 @@ export class StatsPanel {
 /** Shares of the view by which pictures are larger; empty where they are not. */
 function overscan_text({ x, y }: Sides): string {
   const percent = (side: number): string => number(side - 1, { style: 'percent' });
-  return x === 1 && y === 1 ? '' : ` · ${operator.warp.overscan({ width: percent(x), height: percent(y) })}`;
+  return x === 1 && y === 1
+    ? ''
+    : ` · ${operator.warp.overscan({ width: percent(x), height: percent(y) })}`;
 }

@@ -1,5 +1,11 @@
 // Texts of the statistics overlay. Pure.
-import { stages, type PagesDrawn, type Stage, type StatsReport, type StatsSnapshot } from '../stats/metrics';
+import {
+  stages,
+  type PagesDrawn,
+  type Stage,
+  type StatsReport,
+  type StatsSnapshot,
+} from '../stats/metrics';
 import { decimals, number } from '../text/number';
 import { operator } from '../text/operator';
 
@@ -21,7 +27,14 @@ function measured(values: readonly number[], digits: number, unit: string): stri
 
 const pixels = (count: number): string => number(count, { useGrouping: false });
 
-function detail({ detail_px, coarsest_px, gaussians, finest_level, coarsest_level, missing_pages }: PagesDrawn): string {
+function detail({
+  detail_px,
+  coarsest_px,
+  gaussians,
+  finest_level,
+  coarsest_level,
+  missing_pages,
+}: PagesDrawn): string {
   const px = Math.max(detail_px, coarsest_px);
   const [finest, coarsest] = [number(finest_level), number(coarsest_level)];
   return [
@@ -41,7 +54,9 @@ const stage_row = (stage: Stage): Row => ({
 
 /** The stage that takes most of a frame's time; undefined before a measurement. */
 export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | undefined {
-  return stages.filter((stage) => stages_ms[stage] > 0).sort((a, b) => stages_ms[b] - stages_ms[a])[0];
+  return stages
+    .filter((stage) => stages_ms[stage] > 0)
+    .sort((a, b) => stages_ms[b] - stages_ms[a])[0];
 }
 
 /** Gives a dash before the first picture. */
@@ -67,7 +82,10 @@ export const stats_rows: readonly Row[] = [
     text: once_shown((s) => measured([s.bitrate_kbps / 1000], 2, units.megabits)),
   },
   ...stages.map(stage_row),
-  { label: words.picture, text: once_shown((s) => `${pixels(s.width_px)} × ${pixels(s.height_px)}`) },
+  {
+    label: words.picture,
+    text: once_shown((s) => `${pixels(s.width_px)} × ${pixels(s.height_px)}`),
+  },
   {
     label: words.detail,
     title: words.detail_title,
@@ -76,7 +94,9 @@ export const stats_rows: readonly Row[] = [
   {
     label: words.drops,
     title: words.drops_title,
-    text: once_shown((s) => words.drops_value({ here: s.frames_dropped, server: s.packets_dropped })),
+    text: once_shown((s) =>
+      words.drops_value({ here: s.frames_dropped, server: s.packets_dropped }),
+    ),
   },
 ];
 

@@ -42,7 +42,10 @@ export class Together {
   private readonly places_ = by_id('present-places', HTMLInputElement);
 
   constructor(
-    private readonly parts_: Pick<PageParts, 'worker' | 'navigation' | 'toolbar' | 'notice' | 'reduced_motion'>,
+    private readonly parts_: Pick<
+      PageParts,
+      'worker' | 'navigation' | 'toolbar' | 'notice' | 'reduced_motion'
+    >,
     private readonly pointing_: Pointing,
   ) {
     const { worker, navigation } = parts_;
@@ -93,8 +96,7 @@ export class Together {
     else if (lead.state === Lead_State.ENDED) {
       if (!lead.elsewhere) this.ended();
       else if (this.wants_) this.go_along();
-    }
-    else if (eye && this.wants_) this.follow(eye);
+    } else if (eye && this.wants_) this.follow(eye);
     if (this.role_ === 'following' && differ(before, lead)) this.show();
   }
 
@@ -120,7 +122,9 @@ export class Together {
       this.become('following');
       this.joining_ = true;
       const from = this.parts_.navigation.eye;
-      const time_s = this.parts_.reduced_motion ? 0 : glide_time_s(from, eye, this.parts_.navigation.reach);
+      const time_s = this.parts_.reduced_motion
+        ? 0
+        : glide_time_s(from, eye, this.parts_.navigation.reach);
       this.fly(glide(from, eye, time_s));
     } else if (!this.joining_) {
       this.chase();
@@ -128,7 +132,10 @@ export class Together {
   }
 
   private chase(): void {
-    const { leader_eye_: to, parts_: { navigation } } = this;
+    const {
+      leader_eye_: to,
+      parts_: { navigation },
+    } = this;
     if (to) this.fly(this.parts_.reduced_motion ? glide(to, to, 0) : pursuit(navigation.eye, to));
   }
 
@@ -178,7 +185,13 @@ export class Together {
   }
 
   private stop(): void {
-    this.parts_.worker.post({ kind: 'present', on: false, name: '', pings: false, tells_places: false });
+    this.parts_.worker.post({
+      kind: 'present',
+      on: false,
+      name: '',
+      pings: false,
+      tells_places: false,
+    });
     this.become('alone');
   }
 
@@ -204,7 +217,8 @@ export class Together {
     this.parts_.toolbar.watching = watching;
     this.view_.setAttribute('role', watching ? 'img' : 'application');
     const leading = role === 'leading';
-    for (const id of ['present-link', 'present-copy', 'present-stop']) by_id(id, HTMLElement).hidden = !leading;
+    for (const id of ['present-link', 'present-copy', 'present-stop'])
+      by_id(id, HTMLElement).hidden = !leading;
     for (const id of ['present-name', 'present-start']) by_id(id, HTMLElement).hidden = leading;
     by_id('present-done', HTMLOutputElement).textContent = '';
     this.show();
@@ -229,13 +243,17 @@ export class Together {
       left: this.lead_?.name ? words.follow({ name }) : words.follow_somebody,
       leading: words.stop,
     };
-    this.pointing_.allowed = this.role_ === 'leading' || (this.role_ === 'following' && this.lead_?.mayPing === true);
+    this.pointing_.allowed =
+      this.role_ === 'leading' || (this.role_ === 'following' && this.lead_?.mayPing === true);
     const line = by_id('company-text', HTMLElement);
     if (line.textContent !== said[this.role_]) line.textContent = said[this.role_];
     this.bar_.hidden = said[this.role_] === '' && action[this.role_] === '';
     this.action_.textContent = action[this.role_];
     this.action_.hidden = action[this.role_] === '';
-    this.view_.setAttribute('aria-label', this.role_ === 'watching' ? words.view({ name }) : this.own_label_);
+    this.view_.setAttribute(
+      'aria-label',
+      this.role_ === 'watching' ? words.view({ name }) : this.own_label_,
+    );
   }
 }
 
@@ -246,6 +264,7 @@ const differ = (a: Lead | undefined, b: Lead): boolean =>
 /** As much of the name as the wire takes. */
 function within_bytes(name: string): string {
   let short = Array.from(name);
-  while (new TextEncoder().encode(short.join('')).length > most_name_bytes) short = short.slice(0, -1);
+  while (new TextEncoder().encode(short.join('')).length > most_name_bytes)
+    short = short.slice(0, -1);
   return short.join('');
 }

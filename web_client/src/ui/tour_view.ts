@@ -36,7 +36,12 @@ export class TourView {
       Space: () => player.toggle(),
     };
     window.addEventListener('keydown', (event) => {
-      if (event.code === 'Space' && event.target instanceof Element && event.target.closest('button, summary')) return; // a click
+      if (
+        event.code === 'Space' &&
+        event.target instanceof Element &&
+        event.target.closest('button, summary')
+      )
+        return; // a click
       const action = actions[event.code];
       if (!action || !this.has_tours_ || !is_for_page(event)) return;
       event.preventDefault();
@@ -50,7 +55,9 @@ export class TourView {
     this.card_.hidden = !this.has_tours_;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
-      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered({ n: i + 1 }), String(i))),
+      ...tours.map(
+        ({ title }, i) => new Option(title || text.tour.numbered({ n: i + 1 }), String(i)),
+      ),
     );
   }
 
@@ -67,7 +74,11 @@ export class TourView {
     this.text_.scrollTop = 0;
     this.show_portal(stop);
     by_id('tour-place', HTMLElement).textContent =
-      count === 0 ? '' : stop_index === undefined ? text.tour.stops({ count }) : text.tour.place({ n: stop_index + 1, count });
+      count === 0
+        ? ''
+        : stop_index === undefined
+          ? text.tour.stops({ count })
+          : text.tour.place({ n: stop_index + 1, count });
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }
@@ -83,7 +94,9 @@ export class TourView {
     const is_closed = target !== undefined && target.scene_id === undefined;
     this.portal_.hidden = target === undefined;
     this.portal_.disabled = is_closed;
-    by_id('tour-portal-text', HTMLElement).textContent = target ? text.portals.to({ scene: target.title }) : '';
+    by_id('tour-portal-text', HTMLElement).textContent = target
+      ? text.portals.to({ scene: target.title })
+      : '';
     const closed = by_id('tour-closed', HTMLElement);
     closed.hidden = !is_closed;
     closed.textContent = is_closed ? text.portals.closed({ scene: target.title }) : '';

@@ -53,7 +53,9 @@ export class TurnCall {
     this.notice_.show(text.turn.will_call, 10);
     const permission = globalThis.Notification as typeof Notification | undefined;
     if (permission?.permission === 'default') {
-      permission.requestPermission().catch((error: unknown) => console.warn('no notifications', error));
+      permission
+        .requestPermission()
+        .catch((error: unknown) => console.warn('no notifications', error));
     }
   }
 
@@ -101,7 +103,9 @@ export class TurnCall {
   }
 
   private lead(lead: string): void {
-    const own = document.title.startsWith(this.lead_) ? document.title.slice(this.lead_.length) : document.title;
+    const own = document.title.startsWith(this.lead_)
+      ? document.title.slice(this.lead_.length)
+      : document.title;
     this.lead_ = lead;
     document.title = lead + own;
   }

@@ -45,7 +45,12 @@ export function card_for(
       const time = duration(state.estimate_s);
       const { loading_scene, queue } = cards;
       return state.for_scene
-        ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time({ time }), busy: true }
+        ? {
+            title: loading_scene.title,
+            text: loading_scene.text,
+            time: loading_scene.time({ time }),
+            busy: true,
+          }
         : {
             title: queue.title({ position: state.position }),
             text: queue.text,
@@ -70,7 +75,12 @@ export function card_for(
   }
 }
 
-function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[], has_token: boolean): Card {
+function failed_card(
+  code: Error_Code,
+  message: string,
+  scenes: readonly SceneListing[],
+  has_token: boolean,
+): Card {
   const retry = { label: actions.retry, does: 'retry' } as const;
   const said = ({ title, text }: { title: string; text: string }): Card => ({
     title,
@@ -80,7 +90,9 @@ function failed_card(code: Error_Code, message: string, scenes: readonly SceneLi
   switch (code) {
     case Error_Code.UNAUTHORIZED:
       return {
-        title: cards.unauthorized, text: sentence(message).trim(), asks_token: true,
+        title: cards.unauthorized,
+        text: sentence(message).trim(),
+        asks_token: true,
         ...(has_token && { action: { label: actions.look, does: 'look' } }),
       };
     case Error_Code.UNKNOWN_SCENE:

@@ -16,7 +16,12 @@ function stand_around(map: WalkMap, place: Vec3): Stand | undefined {
     let best: Stand | undefined;
     let nearest = Infinity;
     for (let k = -r; k < r; ++k)
-      for (const [x, y] of [[k, -r], [r, k], [-k, r], [-r, -k]] as const) {
+      for (const [x, y] of [
+        [k, -r],
+        [r, k],
+        [-k, r],
+        [-r, -k],
+      ] as const) {
         const distance = Math.hypot(x, y);
         if (distance >= nearest) continue;
         const beside = add(place, add(scale(east, x * map.cell), scale(north, y * map.cell)));
@@ -41,7 +46,10 @@ export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | 
       if (place < 0) continue;
       nearest = distance;
       const height = height_of(place);
-      best = distance === 0 ? { ...stand, height } : { east: column + x + 0.5, north: row + y + 0.5, height };
+      best =
+        distance === 0
+          ? { ...stand, height }
+          : { east: column + x + 0.5, north: row + y + 0.5, height };
     }
   return best;
 }
@@ -68,7 +76,12 @@ export class MapWalker implements Ground {
   walk(movement: Vec3): Vec3 {
     const [east, north] = this.map.axes;
     const { cell } = this.map;
-    this.stand_ = move(this.map, this.stand_, dot(movement, east) / cell, dot(movement, north) / cell);
+    this.stand_ = move(
+      this.map,
+      this.stand_,
+      dot(movement, east) / cell,
+      dot(movement, north) / cell,
+    );
     return eyes_of(this.map, this.stand_);
   }
 }

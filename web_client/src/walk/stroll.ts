@@ -78,7 +78,8 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
       const flat = sub(line, scale(up, line[0] * up[0] + line[1] * up[1] + line[2] * up[2]));
       const turned = duration_s > 0 ? Math.min(1, time_s / Math.min(turns_in_s, duration_s)) : 1;
       const share = turned * turned * (3 - 2 * turned);
-      const level = length(flat) > 1e-6 * ahead ? look_at(here, add(here, flat), up) : from.orientation;
+      const level =
+        length(flat) > 1e-6 * ahead ? look_at(here, add(here, flat), up) : from.orientation;
       return {
         position: add(here, scale(away, 1 - share)),
         orientation: slerp(from.orientation, level, share),

@@ -8,7 +8,12 @@ const most_pieces = 25_000;
 const aside = [0, 1, -1, 2, -2, 3, -3].map((k) => (k * Math.PI) / 8);
 
 /** Height of the ground at a place, bilinear between the middles of cells; undefined off clear ground. */
-export function ground_at(map: WalkMap, east: number, north: number, height: number): number | undefined {
+export function ground_at(
+  map: WalkMap,
+  east: number,
+  north: number,
+  height: number,
+): number | undefined {
   const here = clear_at(map, Math.floor(east), Math.floor(north), height);
   if (here < 0) return undefined;
   const own = height_of(here);

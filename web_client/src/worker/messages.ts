@@ -71,7 +71,13 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; presenter: PresenterKind; warp: WarpState; warps: boolean; overscan: Sides }
+  | {
+      kind: 'presenter';
+      presenter: PresenterKind;
+      warp: WarpState;
+      warps: boolean;
+      overscan: Sides;
+    }
   /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `hit`: undefined where nothing is there. */

@@ -26,7 +26,8 @@ const scope = self as unknown as {
   onunhandledrejection: ((event: PromiseRejectionEvent) => void) | null;
 };
 
-const say = (message: FromWorker, transfer: Transferable[] = []): void => scope.postMessage(message, transfer);
+const say = (message: FromWorker, transfer: Transferable[] = []): void =>
+  scope.postMessage(message, transfer);
 
 let client: Client | undefined;
 
@@ -225,10 +226,20 @@ class Client {
         lead: (lead) => {
           this.leader_ = lead.name;
           const { camera } = lead;
-          say({ kind: 'lead', lead, eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad) });
+          say({
+            kind: 'lead',
+            lead,
+            eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad),
+          });
         },
         pinged: ({ place, byLeader }) => {
-          if (place) say({ kind: 'pinged', place: vector_of(place), by_leader: byLeader, name: this.leader_ });
+          if (place)
+            say({
+              kind: 'pinged',
+              place: vector_of(place),
+              by_leader: byLeader,
+              name: this.leader_,
+            });
         },
         company: ({ places }) => say({ kind: 'company_moved', places: places.map(vector_of) }),
         notice: (message) => say({ kind: 'notice', message }),
@@ -289,7 +300,8 @@ class Client {
     if (failures === 0) this.first_rung_ = this.rung_;
     const now_us = (): number => this.clock_.now_us();
     const made = await make_decoder(config, this.first_rung_, failures, now_us, events);
-    if (made && failures >= failures_per_rung && made.rung !== this.rung_) this.settle_on(made.rung);
+    if (made && failures >= failures_per_rung && made.rung !== this.rung_)
+      this.settle_on(made.rung);
     return made?.decoder;
   }
 
@@ -311,7 +323,9 @@ class Client {
   }
 }
 
-const clip_message = (plane: ClipPlane | undefined): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
+const clip_message = (
+  plane: ClipPlane | undefined,
+): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
   plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
