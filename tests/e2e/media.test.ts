@@ -61,13 +61,11 @@ interface Heard {
   readonly time_s: number;
 }
 const voice = (page: Page): Promise<Heard> =>
-  page
-    .locator('#tour > audio')
-    .evaluate((audio: HTMLAudioElement) => ({
-      paused: audio.paused,
-      muted: audio.muted,
-      time_s: audio.currentTime,
-    }));
+  page.locator('#tour > audio').evaluate((audio: HTMLAudioElement) => ({
+    paused: audio.paused,
+    muted: audio.muted,
+    time_s: audio.currentTime,
+  }));
 
 describe('an author', () => {
   it('adds a picture, a film, a voice and a sound', async () => {
