@@ -1,14 +1,9 @@
-// Writes the English texts as literals, so that the compiler knows each text and the values in it.
+// Writes the English catalogues as literals, so that the compiler knows each text and the values in it.
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 
 const folder = new URL('src/text/generated/', import.meta.url);
-const literal = (name) => {
-  const json = readFileSync(new URL(`locales/${name}.json`, import.meta.url), 'utf8').trim();
-  return `${json} as const;`;
-};
-
 mkdirSync(folder, { recursive: true });
-writeFileSync(
-  new URL('english.ts', folder),
-  `export const english = ${literal('en')}\nexport const english_operator = ${literal('operator')}\n`,
-);
+for (const name of ['en', 'operator', 'console']) {
+  const json = readFileSync(new URL(`locales/${name}.json`, import.meta.url), 'utf8').trim();
+  writeFileSync(new URL(`${name}.ts`, folder), `export const catalogue = ${json} as const;\n`);
+}

@@ -1,11 +1,11 @@
 // Puts the texts of locales/en.json into index.html, where {{page.view}} names one, and leaves the key beside
 // each, for other languages (src/text/page.ts). The build does this, so that the texts are readable without a
 // script and an English page does not change while it loads.
-import { english } from './src/text/generated/english';
+import { catalogue } from './src/text/generated/en';
 import { text_called } from './src/text/key';
 import { messages } from './src/text/messages';
 
-const text = messages(english, 'en', 'en');
+const text = messages(catalogue, 'en', 'en');
 
 const escaped = (plain: string): string => plain.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 

@@ -46,7 +46,7 @@ describe('an author', () => {
     await page.getByLabel('Title of stop 2').fill('Nearer');
     await page.getByLabel('Title of the tour', { exact: true }).fill('My tour');
     await page.getByRole('button', { name: 'Move stop 2 up' }).click();
-    await page.getByRole('button', { name: 'Begin visits here' }).click();
+    await page.getByRole('button', { name: 'Start visits here' }).click();
     await page.getByLabel('Title of stop 2').focus();
     await page.getByRole('button', { name: 'Show' }).last().click();
     await settle(page);
@@ -64,7 +64,7 @@ describe('an author', () => {
     await page.getByLabel('Title', { exact: true }).fill('The old city');
     await page.getByLabel('Credits').fill('Ada Lovelace');
     await page.getByLabel('Licence').fill('CC-BY-4.0');
-    await page.getByLabel('Visitors begin in').selectOption('Walk');
+    await page.getByLabel('Visitors start in').selectOption('Walk');
     await page.getByLabel('Background').fill('#203040');
     await keep_screenshot(page, 'author-about');
     await page.getByRole('button', { name: 'Save to the server' }).click();
@@ -178,7 +178,7 @@ describe('an author', () => {
     ];
     await edit(first, 'By the first');
     await first.getByText('Saved. Visitors get it').waitFor();
-    const replace = second.getByRole('button', { name: 'Replace theirs' });
+    const replace = second.getByRole('button', { name: 'Replace the other version' });
     expect(await replace.isHidden()).toBe(true);
     await edit(second, 'By the second');
     await second.getByText('Not saved: someone else has saved this scene').waitFor();
@@ -205,7 +205,7 @@ describe('an author', () => {
     expect(file.suggestedFilename()).toBe('mine.json');
     const { tours } = JSON.parse(readFileSync(await file.path(), 'utf8')) as { tours: unknown };
     expect(tours).toMatchObject([{ stops: expect.any(Array) as unknown }]);
-    await page.getByText('link of role author').waitFor();
+    await page.getByText('open an author link').waitFor();
   });
 
   const rooms = {

@@ -210,10 +210,10 @@ describe('which way is up', () => {
       .poll(up_now)
       .toEqual([expect.closeTo(0, 6), expect.closeTo(-1, 6), expect.closeTo(0, 6)]);
 
-    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    await page.getByRole('button', { name: 'Use the surface in the middle as the floor' }).click();
     await page.getByText('There is no surface in the middle').waitFor();
     wall_z = 0;
-    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    await page.getByRole('button', { name: 'Use the surface in the middle as the floor' }).click();
     // The wall has become the floor, seen from 30 degrees above it.
     await expect.poll(async () => (await pose_of(page)).position[2]).toBeCloseTo(-2.5, 3);
     expect((await up_now())[2]).toBeCloseTo(-Math.cos(Math.PI / 6), 3);
@@ -280,7 +280,7 @@ describe('fingers', () => {
 
   const tap = (page: Page): Promise<void> => page.touchscreen.tap(200, 220);
 
-  it('point at a place by a double tap', async () => {
+  it('look at a point by a double tap', async () => {
     const page = await open(true);
     await tap(page);
     await tap(page);
@@ -289,7 +289,7 @@ describe('fingers', () => {
       .toBe(true);
   });
 
-  it('walk to a place by one tap', async () => {
+  it('walk to a point by one tap', async () => {
     wall_z = 0;
     const page = await open(true);
     for (const mode of ['Orbit', 'Fly']) await page.getByRole('button', { name: mode }).tap();

@@ -44,8 +44,8 @@ async function open_panel(page: Page): Promise<void> {
 async function made(page: Page, kind: string, size: string): Promise<Buffer> {
   await page.getByLabel('Kind').selectOption(kind);
   await page.getByLabel('Size').selectOption(size);
-  await page.getByRole('button', { name: 'Make it' }).click();
-  await page.getByText('It is ready.').waitFor({ timeout: 100_000 });
+  await page.getByRole('button', { name: 'Create' }).click();
+  await page.getByText('Ready.').waitFor({ timeout: 100_000 });
   const [download] = await Promise.all([
     page.waitForEvent('download'),
     page.getByRole('link', { name: 'Save it on this device' }).click(),
@@ -72,7 +72,7 @@ describe('an author', () => {
     expect(film.toString('latin1', 4, 8)).toBe('ftyp');
     expect(film.includes('avcC')).toBe(true); // H.264
     await page.getByLabel('Size').selectOption('1920 × 1080');
-    await page.getByRole('button', { name: 'Make it' }).click();
+    await page.getByRole('button', { name: 'Create' }).click();
     await page.getByRole('button', { name: 'Cancel' }).click();
     await page.getByText('Cancelled.').waitFor();
     const [path_file] = await Promise.all([
@@ -129,8 +129,8 @@ it('a film is made for authors alone, within bounds', async () => {
 it('a visitor may save the camera path, and is told who may order', async () => {
   const { page } = await open(link('viewer'), windows.desktop);
   await open_panel(page);
-  await page.getByText('To make one here, open a link of role author.').waitFor();
-  expect(await page.getByRole('button', { name: 'Make it' }).isHidden()).toBe(true);
+  await page.getByText('To create one here, open an author link.').waitFor();
+  expect(await page.getByRole('button', { name: 'Create' }).isHidden()).toBe(true);
   await page.getByLabel('Kind').selectOption('film');
   expect(await page.getByRole('button', { name: 'Save the camera path' }).isVisible()).toBe(true);
 });

@@ -52,7 +52,7 @@ async function look(page: FirefoxPage, name: string): Promise<void> {
 }
 
 const at_stop = (page: FirefoxPage, place: string): Promise<void> =>
-  page.until(`document.getElementById('tour-place').textContent === '${place}'`);
+  page.until(`document.getElementById('tour-position').textContent === '${place}'`);
 const in_scene = (page: FirefoxPage, title: string): Promise<void> =>
   page.until(`document.getElementById('scene-name').textContent.startsWith('${title}')`);
 

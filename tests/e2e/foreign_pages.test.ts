@@ -265,7 +265,7 @@ it('what gets into the page all the same is stopped by the policy, and the page 
   expect(foreign.asked.length).toBe(asked);
   await page.keyboard.press('PageDown');
   const place = (): Promise<string | null> =>
-    page.evaluate(() => document.getElementById('tour-place')!.textContent);
+    page.evaluate(() => document.getElementById('tour-position')!.textContent);
   await expect.poll(place).toBe('1 of 2'); // locators would wait for the form to be sent
   await settle(page);
 });

@@ -125,7 +125,7 @@ const states: Readonly<Record<string, State>> = {
   },
   'old-page': {
     script: refuse(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
-    shown: title('do not fit together'),
+    shown: title('does not match the server'),
   },
   view: { shown: settle },
   lost: {

@@ -85,7 +85,7 @@ describe('an author', () => {
       'drawing.png',
       Buffer.from('<svg xmlns="http://www.w3.org/2000/svg"/>'),
     );
-    await page.getByText('Not kept: drawing.png: is of no format').waitFor();
+    await page.getByText('Not added: drawing.png: is of no format').waitFor();
     await send('Add a picture, film or sound', 'The roof.jpg', jpeg);
     await page.getByLabel('What The-roof.jpg shows').fill('The roof seen from below');
     await send('Add a picture, film or sound', 'opening.webm', film);

@@ -35,7 +35,7 @@ describe('files', () => {
     const kind_of = (file: string): Kind => {
       if (languages.some((language) => file.startsWith(`${language}-`))) return 'language';
       if (index.includes(file) || file.startsWith('worker-')) return 'first';
-      return /^(stats_charts|author_media|film_panel)-/.test(file) ? 'tools' : 'visitors';
+      return /^(stats_charts|author_media|film_panel|console)-/.test(file) ? 'tools' : 'visitors';
     };
     const sizes = (kind: Kind): number[] =>
       packed.flatMap(([file, bytes]) => (kind_of(file) === kind ? [bytes] : []));
@@ -128,7 +128,7 @@ describe('page', () => {
     await settle(page);
     expect(await page.locator('#toolbar').getAttribute('inert')).toBeNull();
     await page.getByRole('button', { name: 'Share' }).click();
-    await page.getByText('Your access token is not in it').waitFor();
+    await page.getByText('does not contain your access token').waitFor();
     expect(await page.getByLabel('Link to this view').inputValue()).not.toContain('right');
     await keep_screenshot(page, 'fake-token-share');
   });
@@ -162,7 +162,7 @@ describe('page', () => {
       expect.stringMatching(/^The hall\s+Ada · MIT$/),
       'garden',
     ]);
-    expect(server.peers).toEqual([]); // no place is taken
+    expect(server.peers).toEqual([]); // no slot is taken
     await page.keyboard.press('Tab');
     await page.keyboard.press('Enter');
     await page.waitForURL(`${server.url}?author=&scene=city`);
@@ -216,7 +216,7 @@ describe('page', () => {
     expect(await button.evaluate((element) => element === document.activeElement)).toBe(true);
   });
 
-  it('has the place in the queue in its title, and calls who is not looking', async () => {
+  it('has the position in the queue in its title, and calls visitors who look elsewhere', async () => {
     let admit = (): void => undefined;
     const server = await start_fake_server((peer, body) => {
       if (body.case !== 'hello') return stream(peer, body);

@@ -6,7 +6,7 @@ import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { keep_screenshot, new_page, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
-import { present } from './support/company';
+import { present } from './support/shared_tour';
 import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder, write_tours } from './support/scenes';
 
@@ -99,75 +99,76 @@ describe('a portal', () => {
     expect(errors).toEqual([]);
   });
 
-  it('takes those along who follow a guide, or watch', async () => {
-    const { page: leader, errors } = await open(
+  it('takes participants along who follow a host, or watch', async () => {
+    const { page: host, errors } = await open(
       `${server.url}?scene=town${token()}`,
       windows.desktop,
     );
-    await go_to_stop(leader, 1);
-    const link = await present(leader);
-    await leader.keyboard.press('Escape');
-    const { page: follower, errors: more } = await open(
+    await go_to_stop(host, 1);
+    const link = await present(host);
+    await host.keyboard.press('Escape');
+    const { page: participant, errors: more } = await open(
       `${link}&${token().slice(1)}`,
       windows.phone,
     );
     const { page: guest } = await new_page(windows.phone);
     await guest.goto(link); // without a token of their own
-    for (const page of [follower, guest]) await page.getByText('Ada leads, 2 follow').waitFor();
-    await leader.locator('#tour-portal').click();
-    await follower.getByText('Ada goes on in another scene. You follow.').waitFor();
-    for (const page of [follower, guest]) await expect.poll(() => scene_of(page)).toBe('park');
+    for (const page of [participant, guest])
+      await page.getByText('Ada is presenting to 2 participants').waitFor();
+    await host.locator('#tour-portal').click();
+    await participant.getByText('Ada has moved to another scene. You follow.').waitFor();
+    for (const page of [participant, guest]) await expect.poll(() => scene_of(page)).toBe('park');
     await guest.locator('#card').waitFor({ state: 'hidden' });
-    expect(follower.url()).toMatch(/scene=park.*#watch=/);
-    for (const page of [leader, follower, guest])
-      await page.locator('#company', { hasText: /2 (people )?follow/ }).waitFor();
+    expect(participant.url()).toMatch(/scene=park.*#watch=/);
+    for (const page of [host, participant, guest])
+      await page.locator('#shared-tour', { hasText: /presenting to 2 participants/ }).waitFor();
     await expect
-      .poll(async () => distance(await pose_of(leader), await pose_of(follower)))
+      .poll(async () => distance(await pose_of(host), await pose_of(participant)))
       .toBeLessThan(1e-3);
-    await settle(follower);
-    await keep_screenshot(follower, 'portal-followed');
-    expect([errors, more, await barriers(follower)]).toEqual([[], [], []]);
+    await settle(participant);
+    await keep_screenshot(participant, 'portal-followed');
+    expect([errors, more, await barriers(participant)]).toEqual([[], [], []]);
   });
 
   it('lets go of whoever leaves a guide by the history, or after the end', async () => {
-    const { page: leader } = await open(`${server.url}?scene=town${token()}`, windows.desktop);
-    await go_to_stop(leader, 1);
-    const link = await present(leader);
-    await leader.keyboard.press('Escape');
-    const { page: follower } = await open(`${link}&${token().slice(1)}`, {
+    const { page: host } = await open(`${server.url}?scene=town${token()}`, windows.desktop);
+    await go_to_stop(host, 1);
+    const link = await present(host);
+    await host.keyboard.press('Escape');
+    const { page: participant } = await open(`${link}&${token().slice(1)}`, {
       ...windows.desktop,
       reducedMotion: 'reduce',
     });
-    await follower.getByText('Ada leads').waitFor();
+    await participant.getByText('Ada is presenting').waitFor();
     // Both come to the park, each by itself.
-    for (const page of [follower, leader]) {
-      if (page === follower) await go_to_stop(page, 1);
+    for (const page of [participant, host]) {
+      if (page === participant) await go_to_stop(page, 1);
       await page.locator('#tour-portal').click();
       await expect.poll(() => scene_of(page)).toBe('park');
     }
-    await follower.getByRole('button', { name: 'Follow Ada' }).click();
-    await follower.getByText('Ada leads').waitFor();
-    await keep_screenshot(follower, 'portal-before-back');
+    await participant.getByRole('button', { name: 'Follow Ada' }).click();
+    await participant.getByText('Ada is presenting').waitFor();
+    await keep_screenshot(participant, 'portal-before-back');
     const stays_in = async (scene: string): Promise<void> => {
-      await expect.poll(() => scene_of(follower)).toBe(scene);
-      await settle(follower);
-      expect(await scene_of(follower)).toBe(scene);
-      expect(await follower.getByText('Ada goes on in another scene').count()).toBe(0);
+      await expect.poll(() => scene_of(participant)).toBe(scene);
+      await settle(participant);
+      expect(await scene_of(participant)).toBe(scene);
+      expect(await participant.getByText('Ada has moved to another scene').count()).toBe(0);
     };
-    await follower.goBack();
-    await follower.getByRole('button', { name: 'Follow Ada' }).waitFor();
+    await participant.goBack();
+    await participant.getByRole('button', { name: 'Follow Ada' }).waitFor();
     await stays_in('town');
-    await keep_screenshot(follower, 'portal-left-by-history');
+    await keep_screenshot(participant, 'portal-left-by-history');
 
-    await leader.goBack();
-    await expect.poll(() => scene_of(leader)).toBe('town');
-    await follower.getByRole('button', { name: 'Follow Ada' }).click();
-    await follower.getByText('Ada leads').waitFor();
-    await leader.locator('#company-action').click();
-    await follower.getByText('The presentation is over').waitFor();
-    await present(leader);
-    await leader.keyboard.press('Escape');
-    await follower.goForward();
+    await host.goBack();
+    await expect.poll(() => scene_of(host)).toBe('town');
+    await participant.getByRole('button', { name: 'Follow Ada' }).click();
+    await participant.getByText('Ada is presenting').waitFor();
+    await host.locator('#shared-tour-action').click();
+    await participant.getByText('The presentation has ended').waitFor();
+    await present(host);
+    await host.keyboard.press('Escape');
+    await participant.goForward();
     await stays_in('park');
   });
 
@@ -181,8 +182,8 @@ describe('a portal', () => {
     await page.getByText('1 of 3').waitFor();
     expect(await scene_of(page)).toBe('town');
     await page.getByRole('button', { name: 'Pause the tour' }).tap();
-    const place = page.locator('#tour-place');
-    while ((await place.innerText()) !== '3 of 3')
+    const position = page.locator('#tour-position');
+    while ((await position.innerText()) !== '3 of 3')
       await page.getByRole('button', { name: 'Next stop' }).tap();
     await keep_screenshot(page, 'portal-phone');
     expect(await barriers(page)).toEqual([]);
@@ -194,7 +195,7 @@ describe('a portal', () => {
   it('says that it is closed where there is no such scene, or the link does not open it', async () => {
     const { page, errors } = await open(`${server.url}?scene=town${token()}`, windows.desktop);
     await go_to_stop(page, 2);
-    await page.getByText('There is no way to castle for you.').waitFor();
+    await page.getByText('You cannot enter castle.').waitFor();
     expect(await page.locator('#tour-portal').isDisabled()).toBe(true);
     await keep_screenshot(page, 'portal-closed');
     expect(await barriers(page)).toEqual([]);

@@ -255,7 +255,7 @@ describe('trouble', () => {
     page.on('console', (message) => said.push(message.text()));
     await page.goto(plain.url.replace('127.0.0.1', insecure_host));
     await page.getByText('The picture may be slower here').waitFor();
-    expect(said.join()).toContain('WebCodecs');
+    await expect.poll(() => said.join()).toContain('WebCodecs');
     await settle(page);
     await choose_full_size(page);
     const picture = await settled_picture(page);

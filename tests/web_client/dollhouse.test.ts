@@ -2,7 +2,7 @@ import { describe, expect, it } from 'vitest';
 import { Signal } from '#client/base/signal';
 import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
 import type { CameraMode } from '#client/camera/mode';
-import { Dollhouse } from '#client/ground/dollhouse';
+import { Dollhouse } from '#client/walkable_area/dollhouse';
 import { GestureRouter } from '#client/page/gestures';
 import type { Navigation } from '#client/page/navigation';
 import { ceiling_cut, dollhouse_eye, house_around } from '#client/walk/dollhouse';

@@ -4,7 +4,7 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { describe, expect, it } from 'vitest';
-import type { english } from '#client/text/generated/english';
+import type { catalogue } from '#client/text/generated/en';
 import { choose_language, languages } from '#client/text/language';
 import { messages, type Catalogue, type Translation } from '#client/text/messages';
 import { decimals, duration, factor, number } from '#client/text/number';
@@ -53,6 +53,9 @@ describe('the language of the page', () => {
   });
 });
 
+/** Catalogues beside the languages. */
+const english_only = ['operator', 'console'] as const;
+
 const read_catalogue = (name: string): Catalogue =>
   JSON.parse(readFileSync(path.join(locales, `${name}.json`), 'utf8')) as Catalogue;
 
@@ -78,12 +81,13 @@ const all_values = (forms: Readonly<Record<string, string>>): string[] =>
 
 it('each language has a catalogue, and each catalogue a language', () => {
   const files = readdirSync(locales).sort();
-  expect(files).toEqual([...languages, 'operator'].map((name) => `${name}.json`).sort());
+  expect(files).toEqual([...languages, ...english_only].map((name) => `${name}.json`).sort());
 });
 
-describe.each([...languages, 'operator'])('the catalogue %s', (name) => {
-  const language = name === 'operator' ? 'en' : name;
-  const original = forms_of(read_catalogue(name === 'operator' ? name : 'en'));
+describe.each([...languages, ...english_only])('the catalogue %s', (name) => {
+  const is_english = english_only.some((other) => other === name);
+  const language = is_english ? 'en' : name;
+  const original = forms_of(read_catalogue(is_english ? name : 'en'));
   const translated = forms_of(read_catalogue(name));
 
   it('has the texts of English', () => {
@@ -137,11 +141,11 @@ describe('messages', () => {
     const { tour } = await load_texts('ar', 'ar-u-nu-latn');
     const forms = [1, 2, 3, 11, 100].map((count) => tour.stops({ count }));
     expect(forms).toEqual(['محطة واحدة', 'محطتان', '3 محطات', '11 محطة', '100 محطة']);
-    const { together } = await load_texts('en', 'en');
-    expect([0, 1, 2].map((count) => together.you_lead({ count }))).toEqual([
-      'You lead. Nobody follows yet.',
-      'You lead. One person follows.',
-      'You lead. 2 people follow.',
+    const { shared_tour } = await load_texts('en', 'en');
+    expect([0, 1, 2].map((count) => shared_tour.you_present({ count }))).toEqual([
+      'You are presenting. Nobody has joined yet.',
+      'You are presenting to one participant.',
+      'You are presenting to 2 participants.',
     ]);
   });
 
@@ -150,9 +154,9 @@ describe('messages', () => {
     // @ts-expect-error: there is no such text
     expect(tour.swim).toBeUndefined();
     // @ts-expect-error: `count` is missing
-    expect(tour.place({ n: 1 })).toBe('1 of ');
+    expect(tour.position({ n: 1 })).toBe('1 of ');
     // @ts-expect-error: `walk` is missing
-    const lacking: Translation<typeof english>['modes'] = { orbit: '', fly: '' };
+    const lacking: Translation<typeof catalogue>['modes'] = { orbit: '', fly: '' };
     expect(Object.keys(lacking)).toHaveLength(2);
   });
 });

@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '#client/base/vector';
-import { free_name } from '#client/media/shelf';
+import { free_name } from '#client/media/media_folder';
 import { Sounds, type Playable } from '#client/media/sounds';
 import * as limits from '#client/tour/limits';
 import { accepted, kind_of, media_kinds } from '#client/tour/media';
@@ -69,22 +69,22 @@ describe('media of a sidecar', () => {
     [{ media: {} }, 'tours[0].stops[0].media: is not a list'],
     [{ media: [{ alt: 'x' }] }, "media[0]: 'src' is missing"],
     [{ media: [{ src: 'a.jpg' }] }, "media[0]: 'alt' is missing"],
-    [{ media: [{ src: '../a.jpg', alt: 'x' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'a/b.jpg', alt: 'x' }] }, 'media[0].src: is no name of a file'],
+    [{ media: [{ src: '../a.jpg', alt: 'x' }] }, 'media[0].src: is not the name of a file'],
+    [{ media: [{ src: 'a/b.jpg', alt: 'x' }] }, 'media[0].src: is not the name of a file'],
     [
       { media: [{ src: 'http://media.example/a.jpg', alt: 'x' }] },
-      'media[0].src: is no name of a file',
+      'media[0].src: is not the name of a file',
     ],
-    [{ media: [{ src: 'javascript:alert(1)//a.mp4' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'a.svg', alt: 'x' }] }, 'media[0].src: is no image, video or audio'],
-    [{ media: [{ src: 'a.mp4', type: 'page' }] }, 'media[0].type: is no image, video or audio'],
-    [{ media: [{ src: 'a.mp4', captions: 'a.html' }] }, 'captions: is no name of a .vtt file'],
+    [{ media: [{ src: 'javascript:alert(1)//a.mp4' }] }, 'media[0].src: is not the name of a file'],
+    [{ media: [{ src: 'a.svg', alt: 'x' }] }, 'media[0].src: is not an image, video or audio'],
+    [{ media: [{ src: 'a.mp4', type: 'page' }] }, 'media[0].type: is not an image, video or audio'],
+    [{ media: [{ src: 'a.mp4', captions: 'a.html' }] }, 'captions: is not the name of a .vtt file'],
     [
       { media: [{ src: 'a.mp4', captions: 'https://x.example/a.vtt' }] },
-      'captions: is no name of a .vtt file',
+      'captions: is not the name of a .vtt file',
     ],
     [{ media: Array.from({ length: 9 }, () => ({ src: 'a.mp3' })) }, 'has 9 entries, at most 8'],
-    [{ narration: { src: 'a.mp4' } }, 'narration.src: is no sound'],
+    [{ narration: { src: 'a.mp4' } }, 'narration.src: is not a sound'],
   ])('are refused by the field that is wrong: %j', (stop, complaint) => {
     expect(() => stop_of(stop)).toThrow(complaint);
   });

@@ -13,7 +13,7 @@ import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
 import { no_axes, sum_of } from '#client/camera/movement';
-import { place_of, ray_through, surface_of } from '#client/camera/ray';
+import { project, ray_through, surface_of } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
 import { Taps } from '#client/input/pointers';
@@ -114,11 +114,11 @@ describe('a double click', () => {
     const at = eye([1, 2, 3], 0.4);
     const { origin, direction } = ray_through(at, 0.3, 0.8, 1.5);
     const point = origin.map((v, i) => v + direction[i]! * 7) as unknown as Vec3;
-    const [x, y] = place_of(point, at, 1.5)!;
+    const [x, y] = project(point, at, 1.5)!;
     expect(x).toBeCloseTo(0.3, 6);
     expect(y).toBeCloseTo(0.8, 6);
     const back = origin.map((v, i) => v - direction[i]!) as unknown as Vec3;
-    expect(place_of(back, at, 1.5)).toBeUndefined();
+    expect(project(back, at, 1.5)).toBeUndefined();
   });
 
   it('takes four points of the view for a surface that faces the eye', () => {

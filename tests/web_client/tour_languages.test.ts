@@ -72,7 +72,7 @@ describe('tours in several languages', () => {
     [[{ stops: [], translations: 'de' }], 'tours[0].translations: is not an object'],
     [
       [{ stops: [], translations: { de: { title: 1 } } }],
-      'tours[0].translations.de.title: is not a text',
+      'tours[0].translations.de.title: is not text',
     ],
     [
       [

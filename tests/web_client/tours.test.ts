@@ -88,7 +88,7 @@ describe('tours of a sidecar', () => {
   it.each([
     [{}, 'tours: is not a list'],
     [[{ title: 'x' }], "tours[0]: 'stops' is missing"],
-    [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: is not 3 numbers'],
+    [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: does not have 3 numbers'],
     [
       [{ stops: [{ position: [1, 2, 'x'], orientation: [0, 0, 0, 1] }] }],
       'position[2]: is not a number',
@@ -97,7 +97,7 @@ describe('tours of a sidecar', () => {
       [{ stops: [{ position: [0, 0, 0] }] }],
       "tours[0].stops[0]: 'look_at' or 'orientation' is missing",
     ],
-    [[{ stops: [], title: 7 }], 'tours[0].title: is not a text'],
+    [[{ stops: [], title: 7 }], 'tours[0].title: is not text'],
     [Array(33).fill({ stops: [] }), 'has 33 entries, at most 32'],
   ])('say what is wrong with %j', (document, complaint) => {
     expect(() => read_tours(document, up, 1)).toThrow(complaint);
@@ -157,14 +157,14 @@ describe("the SuperSplat viewer's settings.json", () => {
   });
 
   it.each([
-    [{ version: 1 }, 'version 1 is not read here'],
+    [{ version: 1 }, 'version 1 is not supported'],
     [{ version: 2, cameras: [{}] }, "settings.json.cameras[0]: 'initial' is missing"],
     [{ version: 2, annotations: 5 }, 'annotations: is not a list'],
     [
       { version: 2, animTracks: [{ duration: 1, frameRate: 30, keyframes: { times: [0, 0] } }] },
       'times: are not increasing',
     ],
-  ])('is refused with its place where it is wrong: %j', (document, complaint) => {
+  ])('is refused with the field that is wrong: %j', (document, complaint) => {
     expect(() => read_supersplat(document, 1)).toThrow(complaint);
   });
 });

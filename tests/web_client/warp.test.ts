@@ -9,7 +9,7 @@ import {
   type Vec3,
 } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
-import { place_of } from '#client/camera/ray';
+import { project } from '#client/camera/ray';
 import { TurnForecast } from '#client/present/turn_forecast';
 import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
@@ -26,7 +26,7 @@ const eye = (change: Partial<Eye> = {}): Eye => ({
 
 /** Place of a point of the scene in the image of an eye, -1…1. */
 function seen(point: Vec3, by: Eye): readonly [number, number] {
-  const [x, y] = place_of(point, by, aspect)!;
+  const [x, y] = project(point, by, aspect)!;
   return [2 * x - 1, 2 * y - 1];
 }
 

@@ -20,11 +20,11 @@ async function main(): Promise<void> {
   const unsupported = unsupported_card(globalThis);
   if (unsupported) return card.show(unsupported);
   const token = new AccessToken(location, history, browser_storage('sessionStorage'));
-  const wish = new URLSearchParams(location.search).get('scene') ?? '';
-  const scenes = wish ? [] : await list_scenes(location.href, token.value);
+  const requested = new URLSearchParams(location.search).get('scene') ?? '';
+  const scenes = requested ? [] : await list_scenes(location.href, token.value);
   if (scenes.length > 1 && leaves_scene_open(location.href))
     return show_gallery(scenes, token.value);
-  broken = mount_viewer(card, token, wish || (scenes[0]?.id ?? ''));
+  broken = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''));
 }
 
 void main();

@@ -6,7 +6,7 @@ import {
   film_endings,
   film_state,
   order_film,
-  type FilmWish,
+  type FilmRequest,
 } from '../film/jobs';
 import {
   film_eyes,
@@ -17,23 +17,21 @@ import {
   write_views,
 } from '../film/path';
 import { make, save_file } from '../page/dom';
+import type { Navigation } from '../page/navigation';
+import { file_name_of } from '../session/scenes';
 import { duration, number } from '../text/number';
 import { text } from '../text/text';
 import type { Tour } from '../tour/tour';
 
 export interface FilmTools {
-  eye(): Eye;
-  /** The scene's scale to a visitor, world units. */
-  reach(): number;
-  scene_id(): string;
-  file_name(): string; // of the scene, without extension
+  readonly navigation: Navigation;
   /** The tour that is edited. */
   tour(): Tour;
   /** Lets its holder order; undefined: this visitor may not. */
   token(): string | undefined;
 }
 
-type Kind = FilmWish['kind'];
+type Kind = FilmRequest['kind'];
 
 const { film: words } = text;
 const sizes: Readonly<Record<Kind, readonly (readonly [number, number])[]>> = {
@@ -67,7 +65,7 @@ export class FilmPanel {
   private job_: string | undefined;
 
   constructor(
-    place: HTMLElement,
+    host: HTMLElement,
     private readonly tools_: FilmTools,
   ) {
     this.kind_.append(
@@ -81,7 +79,7 @@ export class FilmPanel {
     });
     const row = make('div', {}, this.make_, this.path_, this.cancel_);
     row.classList.add('row');
-    place.append(
+    host.append(
       make('label', {}, make('span', {}, words.kind), this.kind_),
       make('label', {}, make('span', {}, words.size), this.size_),
       row,
@@ -119,21 +117,21 @@ export class FilmPanel {
 
   /** The frames of the film; undefined, and the panel says why: there is none. */
   private eyes(): readonly Eye[] | undefined {
-    if (this.kind !== 'film') return [this.tools_.eye()];
+    if (this.kind !== 'film') return [this.tools_.navigation.eye];
     const tour = this.tools_.tour();
-    const length_s = film_length_s(tour, this.tools_.reach());
+    const length_s = film_length_s(tour, this.tools_.navigation.reach);
     const most_s = most_film_frames / film_fps;
     if (length_s === 0) this.say(words.no_stops);
     else if (length_s > most_s)
       this.say(words.too_long({ most: duration(most_s), length: duration(length_s) }));
-    else return film_eyes(tour, this.tools_.reach());
+    else return film_eyes(tour, this.tools_.navigation.reach);
     return undefined;
   }
 
   private save_path(): void {
     const eyes = this.eyes();
     if (!eyes) return;
-    const file = `${this.tools_.file_name()}.tum`;
+    const file = `${file_name_of(this.tools_.navigation.scene_id)}.tum`;
     save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
     const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
     const command = [
@@ -156,11 +154,11 @@ export class FilmPanel {
     if (!eyes || token === undefined) return;
     const { kind } = this;
     const size = sizes[kind][Number(this.size_.value)]!;
-    const name = this.tools_.file_name() + film_endings[kind];
+    const name = file_name_of(this.tools_.navigation.scene_id) + film_endings[kind];
     this.save_.hidden = true;
     this.say('');
     this.make_.disabled = true;
-    const ordered = await order_film(location.href, token, this.tools_.scene_id(), {
+    const ordered = await order_film(location.href, token, this.tools_.navigation.scene_id, {
       kind,
       size,
       views: write_views(eyes),

@@ -1,34 +1,28 @@
-import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import type { SceneSetup } from '../camera/scene_setup';
 import { by_id, on_click, save_file } from '../page/dom';
-import type { SceneListing } from '../session/scenes';
+import type { Navigation } from '../page/navigation';
+import { file_name_of, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
+import type { TourPlayer } from '../tour/player';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import { tours_for, type Tour } from '../tour/tour';
 import { untranslated, worded, words_for } from '../tour/words';
 import { AuthorAbout } from './about';
 import type { FilmPanel } from './film_panel';
 import { AuthorLanguage } from './language';
+import type { Preview } from './preview';
 import { AuthorStops, type MediaFields, type StopActions } from './stops';
 
 interface AuthorTools {
-  eye(): Eye;
-  reach(): number;
-  scene(): SceneSetup | undefined;
-  scene_id(): string;
+  readonly navigation: Navigation;
+  readonly player: TourPlayer;
+  readonly preview: Preview;
   /** The scenes that this author may see. */
   scenes(): Promise<readonly SceneListing[]>;
-  file_name(): string; // of the scene, without extension
-  /** The point in the middle of the view; undefined: nothing is there. */
-  place_ahead(): Promise<Vec3 | undefined>;
   /** The tours have changed. `edited`: index of the one that is edited; -1: it has no stops. */
   changed(tours: readonly Tour[], edited: number): void;
-  go_to(stop_index: number): void;
-  /** Plays the edited tour as it is so far. */
-  preview(): void;
   readonly media: MediaFields;
   /** Sets where visits begin, for this page; undefined: where they began before. */
   start_at(eye: Eye | undefined): void;
@@ -80,7 +74,7 @@ export class AuthorPanel {
         if (field === undefined) this.edited();
         else this.told();
       },
-      go_to: (i) => tools.go_to(i),
+      go_to: (i) => tools.player.go_to(i),
       take_view: (i) => void this.take_view(i),
       take_marker: (i) => void this.take_marker(i),
       move: (i, by) => {
@@ -106,14 +100,14 @@ export class AuthorPanel {
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
-    this.tools_.media.use(this.tools_.scene_id(), token);
+    this.tools_.media.use(this.tools_.navigation.scene_id, token);
     this.draft_.load(tours, about);
     this.language_.offer(tours);
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
     this.show(0);
     void this.tools_.scenes().then((scenes) => {
-      this.stops_.offer(scenes, this.tools_.scene_id());
+      this.stops_.offer(scenes, this.tools_.navigation.scene_id);
       this.show();
     });
   }
@@ -160,11 +154,11 @@ export class AuthorPanel {
     });
     on_click('author-add', () => void this.add());
     on_click('author-start', () => {
-      draft.edit({ start: tools.eye() });
+      draft.edit({ start: tools.navigation.eye });
       this.told();
       this.say(text.author.start_set);
     });
-    on_click('author-preview', () => tools.preview());
+    on_click('author-preview', () => tools.preview.begin());
     this.autoplay_.addEventListener('change', () => {
       draft.edit_tour({ starts_itself: this.autoplay_.checked });
       this.told();
@@ -181,20 +175,20 @@ export class AuthorPanel {
   }
 
   private async open_film(): Promise<void> {
-    const place = by_id('author-film-fields', HTMLElement);
+    const fields = by_id('author-film-fields', HTMLElement);
     const { FilmPanel } = await import('./film_panel');
     if (this.film_) return this.film_.look();
-    this.film_ = new FilmPanel(place, {
-      ...this.tools_,
+    this.film_ = new FilmPanel(fields, {
+      navigation: this.tools_.navigation,
       tour: () => this.draft_.tour,
       token: () => this.token_,
     });
   }
 
   private async add(): Promise<void> {
-    const eye = this.tools_.eye();
+    const eye = this.tools_.navigation.eye;
     const { edited } = this.draft_.state;
-    const marker = await this.tools_.place_ahead();
+    const marker = await this.tools_.navigation.point_ahead();
     if (edited !== this.draft_.state.edited) return; // the author went on to another tour
     const title = text.tour.stop_numbered({ n: this.draft_.stops.length + 1 });
     this.draft_.add({
@@ -215,9 +209,9 @@ export class AuthorPanel {
   }
 
   private async take_view(index: number): Promise<void> {
-    const eye = this.tools_.eye();
+    const eye = this.tools_.navigation.eye;
     const stop = this.draft_.stops[index];
-    const marker = await this.tools_.place_ahead();
+    const marker = await this.tools_.navigation.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop); // it may have moved meanwhile
     if (at < 0) return;
     this.draft_.change(at, { eye, marker });
@@ -226,7 +220,7 @@ export class AuthorPanel {
 
   private async take_marker(index: number): Promise<void> {
     const stop = this.draft_.stops[index];
-    const marker = await this.tools_.place_ahead();
+    const marker = await this.tools_.navigation.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop);
     if (at < 0) return;
     if (marker) this.draft_.change(at, { marker });
@@ -243,7 +237,7 @@ export class AuthorPanel {
   /** Undefined: there is no scene, or a description is missing, and the author is led to its field. */
   private sidecar(): string | undefined {
     if (this.asks_description()) return undefined;
-    const scene = this.tools_.scene();
+    const { scene } = this.tools_.navigation.camera;
     return scene && `${JSON.stringify(this.draft_.sidecar(scene), undefined, 2)}\n`;
   }
 
@@ -269,7 +263,7 @@ export class AuthorPanel {
     const result = await save_sidecar(
       location.href,
       this.token_,
-      this.tools_.scene_id(),
+      this.tools_.navigation.scene_id,
       sidecar,
       made_from,
     );
@@ -291,7 +285,7 @@ export class AuthorPanel {
   private download(): void {
     const sidecar = this.sidecar();
     if (sidecar === undefined) return;
-    const name = `${this.tools_.file_name()}.json`;
+    const name = `${file_name_of(this.tools_.navigation.scene_id)}.json`;
     save_file(new Blob([sidecar], { type: 'application/json' }), name);
     this.saved_ = this.draft_.state;
     this.say(

@@ -1,4 +1,5 @@
 import type { Eye } from '../camera/eye';
+import type { Navigation } from '../page/navigation';
 import type { Toolbar } from '../page/toolbar';
 import type { TourPlayer } from '../tour/player';
 
@@ -9,8 +10,7 @@ export class Preview {
   constructor(
     private readonly player_: TourPlayer,
     private readonly toolbar_: Toolbar,
-    private readonly eye_: () => Eye,
-    private readonly put_: (eye: Eye) => void,
+    private readonly navigation_: Navigation,
   ) {
     window.addEventListener(
       'keydown',
@@ -24,7 +24,7 @@ export class Preview {
   }
 
   begin(): void {
-    this.from_ = this.eye_();
+    this.from_ = this.navigation_.eye;
     this.toolbar_.make_room();
     this.player_.play_once(() => this.end());
   }
@@ -38,7 +38,7 @@ export class Preview {
     const from = this.from_;
     this.from_ = undefined;
     this.player_.leave();
-    if (from) this.put_(from);
+    if (from) this.navigation_.put_back(from);
     this.toolbar_.open('author');
     document.getElementById('author-preview')?.focus();
   }

@@ -1,7 +1,7 @@
 // The author's editor in the page: what it edits is shown and played at once.
 import type { Eye } from '../camera/eye';
 import type { PageParts } from '../page/parts';
-import { file_name_of, type SceneListing } from '../session/scenes';
+import type { SceneListing } from '../session/scenes';
 import type { SceneAbout } from '../tour/draft';
 import type { TourPlayer } from '../tour/player';
 import type { SidecarTag } from '../tour/save';
@@ -30,29 +30,19 @@ export class TourEditor {
     const { navigation, toolbar } = parts_;
     const { camera } = navigation;
     const { player } = tours;
-    const preview = new Preview(
-      player,
-      toolbar,
-      () => navigation.eye,
-      (eye) => navigation.put_back(eye),
-    );
+    const preview = new Preview(player, toolbar, navigation);
     navigation.taken_over.listen(() => preview.forget());
     this.panel_ = new AuthorPanel({
-      eye: () => camera.eye,
-      reach: () => navigation.reach,
-      scene: () => camera.scene,
-      scene_id: () => navigation.scene_id,
+      navigation,
+      player,
+      preview,
       scenes,
-      file_name: () => file_name_of(navigation.scene_id),
-      place_ahead: () => navigation.place_ahead(),
       changed: (edited, index) => {
         preview.forget();
         tours.offer(edited);
         player.load(edited, true);
         player.choose(index);
       },
-      go_to: (stop_index) => player.go_to(stop_index),
-      preview: () => preview.begin(),
       media,
       start_at: (eye) => camera.start_at(eye ?? this.first_start_),
     });

@@ -16,13 +16,13 @@ import { CameraRig, default_fov_y_rad } from './camera_rig';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
 import { FlyController } from './fly_controller';
-import type { Ground } from './ground';
 import type { CameraMode, ModeController } from './mode';
 import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import { OrbitController } from './orbit_controller';
 import type { SceneSetup } from './scene_setup';
 import { Smoothing } from './smoothing';
 import { WalkController } from './walk_controller';
+import type { Walker } from './walker';
 
 const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
 const turn_rad_per_s = 1.2;
@@ -97,9 +97,9 @@ export class CameraController {
     this.rig_.fov_y_rad = value;
   }
 
-  /** On which visitors walk; undefined: not known, or there is none. */
-  set ground(ground: Ground | undefined) {
-    this.walk_.ground = ground;
+  /** Who walks on the walkable area; undefined: it is not known, or there is none. */
+  set walker(walker: Walker | undefined) {
+    this.walk_.walker = walker;
   }
 
   load(scene: SceneSetup): void {
@@ -152,7 +152,7 @@ export class CameraController {
     this.rig_.unlimited = unlimited;
   }
 
-  /** The place nearest to this one that the scene's limits allow. */
+  /** The point nearest to this one that the scene's limits allow. */
   within(position: Vec3): Vec3 {
     return this.rig_.within(position);
   }

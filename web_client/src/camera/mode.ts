@@ -23,6 +23,6 @@ export interface ModeController {
   settle?(dt_s: number): boolean;
   /** `steps`: notches of a wheel, > 0 towards the scene. */
   dolly(steps: number): void;
-  /** Where the camera goes when the visitor points at a place. */
+  /** Where the camera goes when the visitor points at something. */
   approach(point: Vec3): Eye;
 }

@@ -1,4 +1,4 @@
-// Converts between places in the view and rays in the scene. Pure.
+// Converts between points of the view and rays in the scene. Pure.
 import {
   add,
   conjugate,
@@ -19,7 +19,7 @@ export interface Ray {
   readonly direction: Vec3;
 }
 
-/** Ray through a place of the view. `x`, `y`: shares of its width and height, y down. */
+/** Ray through a point of the view. `x`, `y`: shares of its width and height, y down. */
 export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray {
   const tan = Math.tan(eye.fov_y_rad / 2);
   const inside = normalize([(2 * x - 1) * tan * aspect, (2 * y - 1) * tan, 1], forward);
@@ -27,7 +27,7 @@ export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray
 }
 
 /** Place of a point of the scene in the view, as in ray_through(); undefined behind the camera. */
-export function place_of(
+export function project(
   point: Vec3,
   eye: Eye,
   aspect: number,

@@ -46,14 +46,14 @@ function bind_pointers(
   const taps = new Taps();
   const press = new LongPress(browser_timers);
   /** Shares of the view's width and height. */
-  const place_of = ({ clientX, clientY }: PointerEvent): Pick<Pointed, 'x' | 'y'> => {
+  const project = ({ clientX, clientY }: PointerEvent): Pick<Pointed, 'x' | 'y'> => {
     const { left, top, width, height } = view.getBoundingClientRect();
     return { x: (clientX - left) / width, y: (clientY - top) / height };
   };
   view.addEventListener('pointerdown', (event) => {
     press.end();
     if (listener.wants_presses() && event.isPrimary && event.button === 0) {
-      const pressed = (): void => listener.pointed({ ...place_of(event), how: 'press' });
+      const pressed = (): void => listener.pointed({ ...project(event), how: 'press' });
       if (event.altKey) return pressed();
       press.begin(event.clientX, event.clientY, () => {
         if (!listener.wants_presses()) return;
@@ -69,7 +69,7 @@ function bind_pointers(
     taps.down(event.clientX, event.clientY, pointers.count === 1 && event.button === 0);
   });
   view.addEventListener('pointermove', (event) => {
-    // Until it is a drag, the camera hears nothing of it: a follower's would leave the leader.
+    // Until it is a drag, the camera hears nothing of it: a participant's would leave the host.
     if (press.may_come(event.clientX, event.clientY)) return;
     for (const gesture of pointers.move(sample_of(event), view.clientHeight)) {
       inertia.moved(gesture, event.timeStamp);
@@ -85,7 +85,7 @@ function bind_pointers(
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
         const single = event.pointerType === 'touch' ? 'touch' : 'click';
         if (what !== 'drag')
-          listener.pointed({ ...place_of(event), how: what === 'tap' ? single : what });
+          listener.pointed({ ...project(event), how: what === 'tap' ? single : what });
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();

@@ -1,7 +1,7 @@
-// Lengths, heights and areas between places of the scene, with their errors. Pure.
+// Lengths, heights and areas between points of the scene, with their errors. Pure.
 import { add, cross, dot, length, normalize, scale, sub, type Vec3 } from '../base/vector';
 
-/** A place that the visitor has marked. Standard deviations are in world units. */
+/** A point that the visitor has marked. Standard deviations are in world units. */
 export interface Mark {
   readonly point: Vec3;
   /** Of the ray that found it; unit. */

@@ -12,7 +12,7 @@ import {
   type Medium,
 } from '../tour/media';
 import type { Stop, Tour } from '../tour/tour';
-import { MediaShelf } from './shelf';
+import { MediaFolder } from './media_folder';
 
 interface Choice {
   readonly label: string;
@@ -27,13 +27,13 @@ interface Choice {
 type SetMedium = (i: number, change: (medium: Medium) => Partial<Medium>, field?: string) => void;
 
 export class AuthorMedia implements MediaFields {
-  private shelf_: MediaShelf | undefined;
+  private folder_: MediaFolder | undefined;
   private readonly open_ = new Set<string>(); // summaries whose fields are shown
   private looked_: Promise<void> | undefined; // what is there is known
 
   use(scene_id: string, token: string | undefined): void {
-    this.shelf_ = token === undefined ? undefined : new MediaShelf(scene_id, token);
-    this.looked_ = this.shelf_?.look();
+    this.folder_ = token === undefined ? undefined : new MediaFolder(scene_id, token);
+    this.looked_ = this.folder_?.look();
   }
 
   of_stop(
@@ -211,7 +211,7 @@ export class AuthorMedia implements MediaFields {
     const select = make('select', { 'aria-label': label });
     select.dataset['control'] = control;
     const fill = (): void => {
-      const names = this.shelf_?.of_kind(kinds) ?? [];
+      const names = this.folder_?.of_kind(kinds) ?? [];
       const all = value && !names.includes(value) ? [value, ...names] : names; // the author wrote it by hand
       select.replaceChildren(new Option(none, ''), ...all.map((name) => new Option(name, name)));
       select.value = value;
@@ -238,9 +238,9 @@ export class AuthorMedia implements MediaFields {
       if (sent) void this.send(sent, button, said, chosen);
       file.value = '';
     });
-    const { shelf_: shelf } = this;
-    button.disabled = shelf === undefined;
-    if (shelf === undefined) button.title = words.cannot_send;
+    const { folder_: folder } = this;
+    button.disabled = folder === undefined;
+    if (folder === undefined) button.title = words.cannot_send;
     return make(
       'div',
       { className: 'media-choice' },
@@ -258,11 +258,11 @@ export class AuthorMedia implements MediaFields {
     said: HTMLOutputElement,
     chosen: (name: string) => void,
   ): Promise<void> {
-    const { shelf_: shelf } = this;
-    if (!shelf) return;
+    const { folder_: folder } = this;
+    if (!folder) return;
     button.disabled = true;
     try {
-      const name = await shelf.add(file, (words) => (said.textContent = words));
+      const name = await folder.add(file, (words) => (said.textContent = words));
       said.textContent = '';
       if (button.isConnected) chosen(name);
       else by_id('author-said', HTMLOutputElement).textContent = text.media.sent({ name });

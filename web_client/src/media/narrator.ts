@@ -17,7 +17,7 @@ export class Narrator {
     private readonly voice_: HTMLAudioElement,
     private readonly sounds_: Sounds,
   ) {
-    by_id('tour-place', HTMLElement).before(this.button_);
+    by_id('tour-position', HTMLElement).before(this.button_);
     by_id('tour-controls', HTMLElement).before(this.words_);
     this.button_.append(icon('voice'));
     this.button_.addEventListener('click', () => {

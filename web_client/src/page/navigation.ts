@@ -1,4 +1,4 @@
-// Moves the visitor through the scene: by pointers, keys, sticks, places pointed at, and flights.
+// Moves the visitor through the scene: by pointers, keys, sticks, points to look at, and flights.
 import { browser_timers, type Clock } from '../base/clock';
 import { Signal } from '../base/signal';
 import { add, same, scale, type Vec3 } from '../base/vector';
@@ -6,11 +6,11 @@ import { CameraController } from '../camera/camera_controller';
 import { CameraLoop } from '../camera/camera_loop';
 import type { CameraSample, Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
-import type { Ground } from '../camera/ground';
 import { Inertia } from '../camera/inertia';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
 import { ray_through, surface_of, type Ray } from '../camera/ray';
+import type { Walker } from '../camera/walker';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { bind_view_input } from '../input/view_input';
 import type { Mark } from '../measure/measurement';
@@ -109,7 +109,7 @@ export class Navigation {
     return same(position, eye.position);
   }
 
-  /** Puts the camera where it was before. The ground of a scene may lie outside of its limits. */
+  /** Puts the camera where it was before. The walkable area of a scene may lie outside its limits. */
   put_back(eye: Eye): void {
     this.led_away.emit();
     this.camera.jump(eye);
@@ -140,7 +140,7 @@ export class Navigation {
         [d, 0],
         [0, -d],
         [0, d],
-      ].map(([x, y]) => this.place_at(0.5 + x!, 0.5 + y!)),
+      ].map(([x, y]) => this.point_at(0.5 + x!, 0.5 + y!)),
     );
     const floor = surface_of(found, this.eye.position);
     if (!floor) return false;
@@ -174,9 +174,9 @@ export class Navigation {
     this.changed.emit();
   }
 
-  /** What visitors walk on from now on. `comes_down`: those who walk already come down to it, if nothing leads them. */
-  set_ground(ground: Ground, comes_down: boolean): void {
-    this.camera.ground = ground;
+  /** Who walks from now on. `comes_down`: a camera that walks already comes down to the floor, if nothing leads it. */
+  set_walker(walker: Walker, comes_down: boolean): void {
+    this.camera.walker = walker;
     if (!comes_down || this.camera.mode !== 'walk' || this.camera.is_flying) return;
     this.camera.begin_mode(this.reduced_motion_);
     this.loop.wake();
@@ -189,11 +189,11 @@ export class Navigation {
   }
 
   /** The point in the middle of the view; undefined: nothing is there. */
-  place_ahead(): Promise<Vec3 | undefined> {
-    return this.place_at(0.5, 0.5);
+  point_ahead(): Promise<Vec3 | undefined> {
+    return this.point_at(0.5, 0.5);
   }
 
-  /** The place of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in Pointed. */
+  /** The point of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in Pointed. */
   async hit_at(x: number, y: number): Promise<Mark | undefined> {
     const ray = this.ray_at(x, y);
     const hit = await this.picks_.hit(ray);
@@ -262,7 +262,7 @@ export class Navigation {
     // After a reconnect the visitor stays where they were.
     if (!scene || scene.sceneId === this.scene_id_) return;
     this.scene_id_ = scene.sceneId;
-    this.camera.ground = undefined;
+    this.camera.walker = undefined;
     this.camera.load(scene_setup(scene));
     const mode = start_mode(scene);
     if (mode) this.set_mode(mode);
@@ -273,15 +273,15 @@ export class Navigation {
   /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */
   private async look_at(x: number, y: number): Promise<void> {
     const pointed = ++this.pointed_;
-    const place = await this.place_at(x, y);
-    if (!place || pointed !== this.pointed_) return;
+    const point = await this.point_at(x, y);
+    if (!point || pointed !== this.pointed_) return;
     this.taken_over.emit();
-    this.camera.focus_on(place, this.reduced_motion_);
+    this.camera.focus_on(point, this.reduced_motion_);
     this.loop.wake();
   }
 
   /** Point of the scene. `x`, `y`: shares of the view's width and height, y down. */
-  private place_at(x: number, y: number): Promise<Vec3 | undefined> {
+  private point_at(x: number, y: number): Promise<Vec3 | undefined> {
     return this.picks_.at(this.ray_at(x, y));
   }
 

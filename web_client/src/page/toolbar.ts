@@ -73,7 +73,7 @@ export class Toolbar {
       if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
       if (this.watching && !(event.code in { KeyF: 1, KeyI: 1, Escape: 1 })) return;
       actions[event.code]?.();
-      // By its sign, because its place differs from layout to layout.
+      // By its sign, because its position differs from layout to layout.
       const steps = faster[event.key];
       if (steps) this.navigation_.faster(steps);
     });

@@ -6,7 +6,7 @@ import { limited_fov, type Eye } from '../camera/eye';
 export type Matrix3 = Float32Array;
 
 /**
- * Homography from places in the view to places in the picture. It is exact for the plane at `distance`
+ * Homography from points of the view to points of the picture. It is exact for the plane at `distance`
  * ahead of the view, at a right angle to its axis. With Infinity it is exact for the far field, where
  * only rotation counts. `aspect`: width over height of the picture, and of the view where that differs.
  */
@@ -38,7 +38,7 @@ export function warp_matrix(
   ]);
 }
 
-/** Place in the picture of a place in the view; undefined behind the picture's camera. */
+/** Point of the picture of a point of the view; undefined behind the picture's camera. */
 export function warped(m: Matrix3, x: number, y: number): readonly [number, number] | undefined {
   const w = m[2]! * x + m[5]! * y + m[8]!;
   if (w <= 1e-6) return undefined;

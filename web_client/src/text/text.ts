@@ -1,6 +1,6 @@
 // The texts of the page in the visitor's language. English is part of the page. Other languages load before
 // the page starts, and a language that does not come is replaced by English.
-import { english } from './generated/english';
+import { catalogue as english } from './generated/en';
 import { choose_language, type Language, type LanguageChoice } from './language';
 import { messages, type Messages, type Translation } from './messages';
 

@@ -3,7 +3,7 @@ import { look_at, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
 import { text } from '../text/text';
-import { JsonPlace } from './json_place';
+import { JsonField } from './json_field';
 import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
 import {
   media_for,
@@ -26,7 +26,7 @@ export interface Portal {
   readonly view:
     | {
         readonly position: Vec3;
-        /** The place that is looked at with the up of that scene, or an orientation. */
+        /** The point that is looked at with the up of that scene, or an orientation. */
         readonly look_at: Vec3 | undefined;
         readonly orientation: Quat | undefined;
         readonly fov_y_rad: number | undefined;
@@ -74,11 +74,11 @@ export const flight_to = (stop: Stop, from: Eye, reach: number): Flight =>
   glide(from, stop.eye, stop.fly_s ?? glide_time_s(from, stop.eye, reach));
 
 /**
- * Reads `tours` of a sidecar (README.md). Throws an error that names the wrong place. `up`: that of the
+ * Reads `tours` of a sidecar (TOURS.md). Throws an error that names the wrong field. `up`: that of the
  * scene. `fov_y_rad`: for stops that give none.
  */
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
-  return new JsonPlace('tours', document).elements(max_tours).map((tour) => ({
+  return new JsonField('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
     ...read_translations(tour),
     stops: tour
@@ -91,7 +91,7 @@ export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour
   }));
 }
 
-function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
+function read_stop(stop: JsonField, up: Vec3, fov_y_rad: number): Stop {
   const position = stop.at('position').vec3();
   const target = stop.find('look_at')?.vec3();
   const orientation = target ? look_at(position, target, up) : orientation_of(stop);
@@ -109,14 +109,14 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   };
 }
 
-/** For places without `look_at`. */
-const orientation_of = (place: JsonPlace): Quat =>
+/** For views without `look_at`. */
+const orientation_of = (field: JsonField): Quat =>
   (
-    place.find('orientation') ??
-    place.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))
+    field.find('orientation') ??
+    field.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))
   ).orientation();
 
-function read_portal(portal: JsonPlace | undefined): Portal | undefined {
+function read_portal(portal: JsonField | undefined): Portal | undefined {
   if (!portal) return undefined;
   const position = portal.find('position')?.vec3();
   const target = portal.find('look_at')?.vec3();
@@ -133,7 +133,7 @@ function read_portal(portal: JsonPlace | undefined): Portal | undefined {
   };
 }
 
-function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'language'> {
+function read_translations(item: JsonField): Pick<Worded, 'translations' | 'language'> {
   const written = item.find('translations')?.members(max_languages) ?? [];
   const translations = new Map(
     written.map(([tag, words]) => [

@@ -1,4 +1,4 @@
-// window.catgs: a small interface for tests and for pages that drive the viewer (README.md).
+// window.catgs: a small interface for tests and for pages that drive the viewer (EMBED.md).
 import { browser_timers, type Clock, type Timers } from '../base/clock';
 import type { CameraController } from '../camera/camera_controller';
 import type { Pose } from '../camera/eye';

@@ -1,5 +1,5 @@
 import type { Eye } from '../camera/eye';
-import { place_of } from '../camera/ray';
+import { project } from '../camera/ray';
 import { caption_words } from '../captions/caption';
 import { by_id, icon, make } from '../page/dom';
 import type { SeenCamera } from '../page/seen_camera';
@@ -26,7 +26,7 @@ export class Hotspots {
       // A label may hide what is behind it (WCAG 1.4.13).
       if (code === 'Escape') this.host_.classList.add('labels-dismissed');
     });
-    seen.moved.listen((eye) => this.place(eye));
+    seen.moved.listen((eye) => this.put(eye));
   }
 
   /** `eye`: the camera of the view. */
@@ -39,15 +39,14 @@ export class Hotspots {
       if (other === stop) button.setAttribute('aria-current', 'step');
       else button.removeAttribute('aria-current');
     }
-    this.place(eye);
+    this.put(eye);
   }
 
-  private place(eye: Eye): void {
+  private put(eye: Eye): void {
     const { clientWidth: width_px, clientHeight: height_px } = this.view_;
     for (const { stop, button } of this.spots_) {
-      const place = stop.marker && place_of(stop.marker, eye, width_px / height_px);
-      const inside =
-        place && place[0] > 0 && place[0] < 1 && place[1] > 0 && place[1] < 1 ? place : undefined;
+      const at = stop.marker && project(stop.marker, eye, width_px / height_px);
+      const inside = at && at[0] > 0 && at[0] < 1 && at[1] > 0 && at[1] < 1 ? at : undefined;
       button.hidden = !inside;
       if (!inside) continue;
       const [x, y] = [inside[0] * width_px, inside[1] * height_px];

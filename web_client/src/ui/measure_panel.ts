@@ -1,6 +1,6 @@
-// Measures lengths, heights and areas between places that the visitor points at.
+// Measures lengths, heights and areas between points that the visitor marks.
 import type { Eye } from '../camera/eye';
-import { place_of } from '../camera/ray';
+import { project } from '../camera/ray';
 import type { Pointed } from '../input/pointers';
 import { area_of, length_of, rise_of, type Mark } from '../measure/measurement';
 import { system_here, systems, written, type Scale, type System } from '../measure/units';
@@ -17,7 +17,7 @@ interface MeasureParts extends PageParts {
   readonly set_scale: ((metres_per_unit: number) => void) | undefined;
 }
 
-/** While its panel is open, clicks and taps mark places. */
+/** While its panel is open, clicks and taps mark points. */
 export class MeasurePanel {
   private readonly lines_ = document.createElementNS(svg, 'svg');
   private readonly results_ = by_id('measure-results', HTMLElement);
@@ -58,7 +58,7 @@ export class MeasurePanel {
     this.show();
   }
 
-  /** The first of two clicks has marked the place already. */
+  /** The first of two clicks has marked the point already. */
   private readonly take = ({ x, y, how }: Pointed): boolean => {
     if (how !== 'double tap') void this.mark(x, y);
     return true;
@@ -128,14 +128,14 @@ export class MeasurePanel {
   private draw(eye: Eye): void {
     if (this.marks_.length === 0 && !this.lines_.firstChild) return;
     const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
-    const places = this.marks_.map(({ point }) =>
-      place_of(point, eye, width_px / Math.max(1, height_px)),
+    const points = this.marks_.map(({ point }) =>
+      project(point, eye, width_px / Math.max(1, height_px)),
     );
-    const drawn = places.flatMap((place, i) => {
-      if (!place) return []; // behind the camera
-      const [x, y] = [place[0] * width_px, place[1] * height_px].map((px) => px.toFixed(1));
+    const drawn = points.flatMap((at, i) => {
+      if (!at) return []; // behind the camera
+      const [x, y] = [at[0] * width_px, at[1] * height_px].map((px) => px.toFixed(1));
       const dot = shape('circle', { cx: x!, cy: y!, r: '5' });
-      const to = places[i + 1];
+      const to = points[i + 1];
       const end = to && { x2: (to[0] * width_px).toFixed(1), y2: (to[1] * height_px).toFixed(1) };
       return end ? [shape('line', { x1: x!, y1: y!, ...end }), dot] : [dot];
     });

@@ -6,7 +6,7 @@ import type { PageParts } from '../page/parts';
 import type { PresenterChoice } from '../present/make_presenter';
 import { device_kind } from '../session/device';
 import { watch_token } from '../session/token';
-import { operator } from '../text/operator';
+import type { console_texts } from '../text/console';
 import { text } from '../text/text';
 import type { CardView } from './card';
 import { bind_page_events } from './page_events';
@@ -40,11 +40,14 @@ export function mount_session(
     remember_rung(proved, storage, navigator.userAgent, Date.now()),
   );
   // Visitors hear what it means to them, and the console has the reason.
-  const tell_of_jpeg = (why: string): void => {
-    console.warn(why);
+  const tell_of_jpeg = (why: (texts: (typeof console_texts)['jpeg']) => string): void => {
     notice.show(text.jpeg.slower, 20);
+    import('../text/console').then(
+      ({ console_texts: { jpeg } }) => console.warn(why(jpeg)),
+      (error: unknown) => console.warn('pictures arrive as JPEG', error), // the server is away
+    );
   };
-  worker.on('fallback', ({ message }) => tell_of_jpeg(operator.jpeg.failed_now({ why: message })));
+  worker.on('fallback', ({ message }) => tell_of_jpeg((jpeg) => jpeg.failed_now({ why: message })));
 
   const canvas = by_id('picture', HTMLCanvasElement).transferControlToOffscreen();
   worker.post(
@@ -64,8 +67,8 @@ export function mount_session(
     },
     [canvas],
   );
-  const jpeg = jpeg_reason(has_webcodecs(), isSecureContext, rung);
-  if (jpeg) tell_of_jpeg(jpeg);
+  const reason = jpeg_reason(has_webcodecs(), isSecureContext, rung);
+  if (reason) tell_of_jpeg((jpeg) => jpeg[reason]);
   return (message) => status.break_off(message);
 }
 

@@ -27,16 +27,7 @@ export function mount_tours(
     : undefined;
   new SharePanel(parts, () => views.address);
   const { player } = tours;
-  const embed = new EmbedApi({
-    eye: () => navigation.eye,
-    set_eye: (eye) => views.put(eye),
-    go_to: (stop) => player.go_to(stop),
-    next: () => player.next(),
-    previous: () => player.previous(),
-    play: () => player.play(),
-    pause: () => player.pause(),
-    reset: () => navigation.reset(),
-  });
+  const embed = new EmbedApi({ player, navigation, put: (eye) => views.put(eye) });
   tours.shown.listen(({ stop_index, playing }) =>
     embed.say({ catgs: 'stop', stop: stop_index ?? null, playing }),
   );

@@ -73,12 +73,12 @@ export class TourView {
     this.text_.lang = stop?.language ?? '';
     this.text_.scrollTop = 0;
     this.show_portal(stop);
-    by_id('tour-place', HTMLElement).textContent =
+    by_id('tour-position', HTMLElement).textContent =
       count === 0
         ? ''
         : stop_index === undefined
           ? text.tour.stops({ count })
-          : text.tour.place({ n: stop_index + 1, count });
+          : text.tour.position({ n: stop_index + 1, count });
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }

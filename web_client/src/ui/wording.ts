@@ -3,12 +3,10 @@ import type { DecoderRung } from '../decode/ladder';
 import type { SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import { duration, list } from '../text/number';
-import { operator } from '../text/operator';
 import { text } from '../text/text';
 import { Error_Code } from '../wire/wire';
 
 const { cards, actions } = text;
-const { jpeg } = operator;
 
 export interface Card {
   readonly title: string;
@@ -60,8 +58,12 @@ export function card_for(
           };
     }
     case 'waiting':
-      if (state.cause === 'no_leader') {
-        return { title: cards.waiting.no_leader, text: text.together.comes_by_itself, busy: true };
+      if (state.cause === 'no_host') {
+        return {
+          title: cards.waiting.no_host,
+          text: text.shared_tour.appears_by_itself,
+          busy: true,
+        };
       }
       return {
         title: cards.waiting[state.cause],
@@ -144,14 +146,14 @@ export function unsupported_card(
   return { title, text: text({ lacking: list(lacking) }) };
 }
 
-/** Says why pictures come as JPEG and not as video; undefined when they come as video. */
+/** Why pictures come as JPEG and not as video, as a key of the console's texts; undefined when they come as video. */
 export function jpeg_reason(
   has_webcodecs: boolean,
   is_secure: boolean,
   rung: DecoderRung,
-): string | undefined {
-  if (has_webcodecs) return rung === 'jpeg' ? jpeg.failed_lately : undefined;
-  return is_secure ? jpeg.no_decoder : jpeg.not_secure;
+): 'failed_lately' | 'no_decoder' | 'not_secure' | undefined {
+  if (has_webcodecs) return rung === 'jpeg' ? 'failed_lately' : undefined;
+  return is_secure ? 'no_decoder' : 'not_secure';
 }
 
 function sentence(said: string): string {

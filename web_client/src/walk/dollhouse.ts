@@ -9,7 +9,7 @@ const below_storey_above_cells = 2;
 const pitch_rad = (52 * Math.PI) / 180;
 const margin = 1.1;
 
-/** Where the ground of a house is; undefined where the scene is none: it is neither small nor has storeys. */
+/** The block around a house; undefined where the scene is none: it is neither small nor has storeys. */
 export async function house_around(map: WalkMap): Promise<Block | undefined> {
   const { storeys, tiles } = map;
   const is_house = storeys.length > 1 || Math.max(tiles.width, tiles.depth) <= house_cells;

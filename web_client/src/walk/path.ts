@@ -1,4 +1,4 @@
-// Short paths on a WalkMap (A*, Hart, Nilsson and Raphael 1968), for a tap on a place to go to.
+// Short paths on a WalkMap (A*, Hart, Nilsson and Raphael 1968), for a tap on a point to go to.
 import { Breaths } from '../base/breaths';
 import { column_in_tile, height_of, require, tile_at, tiles_in, type Tile } from './tiles';
 import { clear_in, type Stand, type WalkMap } from './walk_map';

@@ -1,4 +1,4 @@
-// The ground of a scene on which a visitor can walk: a `.walk` file (render_core/walk/walk_file.h).
+// The walkable area of a scene: a `.walk` file (render_core/walk/walk_file.h).
 import { Breaths } from '../base/breaths';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
 import {
@@ -37,7 +37,7 @@ export interface Storey {
 }
 
 export interface WalkMap {
-  readonly origin: Vec3; // the world place of (0, 0, 0)
+  readonly origin: Vec3; // the world position of (0, 0, 0)
   readonly axes: readonly [east: Vec3, north: Vec3, up: Vec3]; // unit vectors of the world
   readonly cell: number; // world units
   readonly step: number; // cells; the highest step up or down
@@ -48,8 +48,8 @@ export interface WalkMap {
   readonly tiles: Tiles; // its columns, to the east, and its rows, to the north
 }
 
-export const to_grid = (map: WalkMap, place: Vec3): Vec3 => {
-  const from_origin = sub(place, map.origin);
+export const to_grid = (map: WalkMap, point: Vec3): Vec3 => {
+  const from_origin = sub(point, map.origin);
   const [east, north, up] = map.axes;
   const inverse = 1 / map.cell;
   return [

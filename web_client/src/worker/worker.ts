@@ -59,7 +59,7 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
-  private leader_ = ''; // the name of who leads
+  private host_ = ''; // the name of who presents
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
 
@@ -134,7 +134,7 @@ class Client {
         this.present(message);
         break;
       case 'ping':
-        this.session_.send({ case: 'ping', value: { place: wire_vector(message.place) } });
+        this.session_.send({ case: 'ping', value: { place: wire_vector(message.point) } });
         break;
       case 'stop':
         this.session_.stop();
@@ -159,10 +159,18 @@ class Client {
     say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
   }
 
-  private present({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): void {
-    // The leader's pictures and field of view are also those of others, who see no warped view.
+  private present({
+    on,
+    name,
+    pings,
+    tells_positions,
+  }: Extract<ToWorker, { kind: 'present' }>): void {
+    // The host's pictures and field of view are also those of participants, who see no warped view.
     this.display_.may_overscan = !on;
-    this.session_.keep({ case: 'present', value: { on, name, pings, tellsPlaces: tells_places } });
+    this.session_.keep({
+      case: 'present',
+      value: { on, name, pings, tellsPlaces: tells_positions },
+    });
   }
 
   private pick(id: number, { origin, direction }: Ray): void {
@@ -224,7 +232,7 @@ class Client {
         picked: ({ id, hit, distance, spread }) =>
           say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
         lead: (lead) => {
-          this.leader_ = lead.name;
+          this.host_ = lead.name;
           const { camera } = lead;
           say({
             kind: 'lead',
@@ -236,12 +244,13 @@ class Client {
           if (place)
             say({
               kind: 'pinged',
-              place: vector_of(place),
-              by_leader: byLeader,
-              name: this.leader_,
+              point: vector_of(place),
+              by_host: byLeader,
+              name: this.host_,
             });
         },
-        company: ({ places }) => say({ kind: 'company_moved', places: places.map(vector_of) }),
+        participants: ({ places }) =>
+          say({ kind: 'participants_moved', positions: places.map(vector_of) }),
         notice: (message) => say({ kind: 'notice', message }),
         stayed: (message) => say({ kind: 'stayed', message }),
       },

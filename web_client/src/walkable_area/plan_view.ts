@@ -1,4 +1,4 @@
-// Where places of the map are in the plan, and back. Pure.
+// Where points of the map are in the plan, and back. Pure.
 export interface PlanView {
   /** Cells that are in the middle. */
   readonly east: number;

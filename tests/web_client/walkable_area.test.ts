@@ -1,11 +1,11 @@
-// Visitors who walk on the ground of a scene, where they point, and the plan of it.
+// Visitors who walk in a scene, where they point, and the plan of it.
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { dot, length, look_at, rotate, sub, type Vec3 } from '#client/base/vector';
 import { CameraController } from '#client/camera/camera_controller';
 import { no_axes } from '#client/camera/movement';
-import { SceneGround } from '#client/ground/scene_ground';
-import { plan_picture } from '#client/ground/plan_picture';
-import { cells_of, px_of } from '#client/ground/plan_view';
+import { WalkMapLoader } from '#client/walkable_area/walk_map_loader';
+import { plan_picture } from '#client/walkable_area/plan_picture';
+import { cells_of, px_of } from '#client/walkable_area/plan_view';
 import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
@@ -40,7 +40,7 @@ function walker(position: Vec3, ahead: Vec3, on: WalkMap = map): CameraControlle
     near_z: 0.1,
     scale: 5,
   });
-  camera.ground = new MapWalker(on);
+  camera.walker = new MapWalker(on);
   camera.set_mode('walk');
   return camera;
 }
@@ -262,12 +262,12 @@ describe('the plan', () => {
   });
 });
 
-describe('a ground that the server still seeks', () => {
+describe('a walk map that the server still computes', () => {
   const asked = vi.fn(() =>
     Promise.resolve(new Response(null, { status: 202, headers: { 'retry-after': '5' } })),
   );
   const told = vi.fn();
-  let ground: SceneGround;
+  let loader: WalkMapLoader;
 
   beforeEach(() => {
     vi.useFakeTimers();
@@ -275,46 +275,46 @@ describe('a ground that the server still seeks', () => {
     vi.stubGlobal('location', { href: 'http://host/' });
     asked.mockClear();
     told.mockClear();
-    ground = new SceneGround({ value: '' } as AccessToken);
-    ground.sought.listen(told);
-    ground.enter('hall');
+    loader = new WalkMapLoader({ value: '' } as AccessToken);
+    loader.computing.listen(told);
+    loader.enter('hall');
   });
 
   afterEach(() => {
-    ground.enter(''); // nobody asks on
+    loader.enter(''); // nobody asks on
     vi.useRealTimers();
     vi.unstubAllGlobals();
   });
 
-  it('is told of once in each scene to those who wait for it', async () => {
-    void ground.want();
+  it('is announced once in each scene to those who wait for it', async () => {
+    void loader.want();
     await vi.advanceTimersByTimeAsync(1);
     expect(told).toHaveBeenCalledTimes(1);
-    void ground.want();
+    void loader.want();
     await vi.advanceTimersByTimeAsync(12_000);
     expect(asked).toHaveBeenCalledTimes(3);
     expect(told).toHaveBeenCalledTimes(1);
-    ground.enter('tower');
-    void ground.want();
+    loader.enter('tower');
+    void loader.want();
     await vi.advanceTimersByTimeAsync(1);
     expect(told).toHaveBeenCalledTimes(2);
   });
 
-  it('is not promised to those who want it when there is none', async () => {
-    void ground.want(true);
+  it('is not announced where there is none', async () => {
+    void loader.want(true);
     await vi.advanceTimersByTimeAsync(1);
     asked.mockResolvedValueOnce({ status: 404, headers: new Headers() } as Response);
     await vi.advanceTimersByTimeAsync(12_000);
-    void ground.want();
+    void loader.want();
     await vi.advanceTimersByTimeAsync(1);
     expect(told).not.toHaveBeenCalled();
   });
 
-  it('is told of at once to those who want it while the page seeks it for nobody', async () => {
-    void ground.want(true);
+  it('is announced at once to somebody who begins to wait for it', async () => {
+    void loader.want(true);
     await vi.advanceTimersByTimeAsync(6000);
     expect(told).not.toHaveBeenCalled();
-    void ground.want();
+    void loader.want();
     expect(told).toHaveBeenCalledTimes(1);
   });
 });

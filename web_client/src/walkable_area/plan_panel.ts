@@ -19,7 +19,7 @@ import { stand_below } from '../walk/walker';
 import type { Dollhouse } from './dollhouse';
 import { plan_picture, type PlanPicture } from './plan_picture';
 import { cells_of, px_of, type PlanView } from './plan_view';
-import './ground.css';
+import './floor_plan.css';
 
 const up_key = 'catgs.plan.up';
 const small_cells = 14 * cells_per_eye_height; // across the small map
@@ -28,11 +28,11 @@ const dot_px = 6;
 const cone_px = 34;
 const unknown = '#c7cfd9';
 const accent = '#1f6feb';
-const people_colour = '#b3477d';
+const participant_colour = '#b3477d';
 
 interface PlanParts {
   readonly storage: Storage | undefined;
-  /** The visitor has chosen a place. */
+  /** The visitor has chosen a point on the floor. */
   readonly go_to: (stand: Stand) => void;
   readonly go_to_stop: (index: number) => void;
   /** Undefined: the scene is no house. */
@@ -48,22 +48,22 @@ interface DrawnPlan {
 
 export class PlanPanel {
   private readonly host_ = by_id('plan-panel', HTMLElement);
-  private readonly canvas_ = make('canvas', { role: 'img', 'aria-label': text.ground.plan });
+  private readonly canvas_ = make('canvas', { role: 'img', 'aria-label': text.floor_plan.title });
   private readonly picture_ = make('div', { className: 'plan-picture', dir: 'ltr' });
   private readonly spots_ = make('div', {
     className: 'plan-stops',
     role: 'group',
     'aria-label': text.page.stops,
   });
-  private readonly storeys_ = make('select', { 'aria-label': text.ground.storey });
+  private readonly storeys_ = make('select', { 'aria-label': text.floor_plan.storey });
   private readonly view_up_ = make(
     'button',
-    { type: 'button', title: text.ground.view_up, 'aria-label': text.ground.view_up },
+    { type: 'button', title: text.floor_plan.view_up, 'aria-label': text.floor_plan.view_up },
     icon('compass'),
   );
   private readonly house_ = make(
     'button',
-    { type: 'button', title: text.ground.dollhouse, 'aria-label': text.ground.dollhouse },
+    { type: 'button', title: text.floor_plan.dollhouse, 'aria-label': text.floor_plan.dollhouse },
     icon('dollhouse'),
   );
   private readonly size_ = make('button', { type: 'button' });
@@ -71,7 +71,7 @@ export class PlanPanel {
   private storey_ = 0;
   private visitors_storey_: number | undefined;
   private stops_: readonly { stop: Stop; stand: Stand; button: HTMLButtonElement }[] = [];
-  private people_: readonly Vec3[] = [];
+  private participants_: readonly Vec3[] = [];
   private eye_: Eye;
   private drawn_: PlanView | undefined;
   private due_ = false;
@@ -90,7 +90,7 @@ export class PlanPanel {
     this.storeys_.hidden = map_.storeys.length < 2;
     this.storeys_.append(
       ...map_.storeys
-        .map((_, k) => new Option(text.ground.storey_numbered({ n: k + 1 }), String(k)))
+        .map((_, k) => new Option(text.floor_plan.storey_numbered({ n: k + 1 }), String(k)))
         .reverse(),
     );
     this.storeys_.addEventListener('change', () => {
@@ -150,8 +150,8 @@ export class PlanPanel {
   }
 
   /** Where the eyes of other visitors are, in the world. */
-  show_people(places: readonly Vec3[]): void {
-    this.people_ = places;
+  show_participants(positions: readonly Vec3[]): void {
+    this.participants_ = positions;
     this.draw_soon();
   }
 
@@ -173,12 +173,12 @@ export class PlanPanel {
   private set_large(large: boolean): void {
     this.host_.classList.toggle('large', large);
     this.size_.replaceChildren(icon(large ? 'small' : 'full'));
-    this.size_.title = large ? text.ground.smaller : text.ground.larger;
+    this.size_.title = large ? text.floor_plan.smaller : text.floor_plan.larger;
     this.size_.setAttribute('aria-label', this.size_.title);
     this.draw_soon();
   }
 
-  /** The plan shows the storey that the visitor comes to. Where no ground is below, it stays. */
+  /** The plan shows the storey that the visitor comes to. Where no floor is below, it stays. */
   private visit_storey(position: Vec3): void {
     const stand =
       stand_below(this.map_, position) ??
@@ -291,16 +291,16 @@ export class PlanPanel {
     context.scale(scale, scale);
     context.drawImage(plan, 0, 0);
     context.restore();
-    for (const place of this.people_)
-      if (this.is_beside(place)) this.draw_dot(context, view, place, people_colour);
+    for (const position of this.participants_)
+      if (this.is_beside(position)) this.draw_dot(context, view, position, participant_colour);
     if (this.storey_ === this.visitors_storey_) this.draw_visitor(context, view);
     this.place_stops(view);
   }
 
   /** Whether somebody's eyes there are in this storey, and not where the visitor is. */
-  private is_beside(place: Vec3): boolean {
-    const [, , height] = to_grid(this.map_, place);
-    const apart_cells = length(sub(place, this.eye_.position)) / this.map_.cell;
+  private is_beside(position: Vec3): boolean {
+    const [, , height] = to_grid(this.map_, position);
+    const apart_cells = length(sub(position, this.eye_.position)) / this.map_.cell;
     return storey_at(this.map_, height) === this.storey_ && apart_cells >= cells_per_eye_height;
   }
 
@@ -323,10 +323,10 @@ export class PlanPanel {
   private draw_dot(
     context: CanvasRenderingContext2D,
     view: PlanView,
-    place: Vec3,
+    position: Vec3,
     colour: string,
   ): void {
-    const [east, north] = to_grid(this.map_, place);
+    const [east, north] = to_grid(this.map_, position);
     context.beginPath();
     context.arc(...px_of(view, east, north), dot_px, 0, 2 * Math.PI);
     context.fillStyle = colour;

@@ -14,7 +14,7 @@ import {
 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, path_of, type Flight, type PathSample } from '../camera/flight';
-import { place_of } from '../camera/ray';
+import { project } from '../camera/ray';
 import type { Pointed } from '../input/pointers';
 import type { Navigation } from '../page/navigation';
 import { floor_along } from '../walk/floor';
@@ -28,7 +28,7 @@ import {
   type Stand,
   type WalkMap,
 } from '../walk/walk_map';
-import './ground.css';
+import './floor_plan.css';
 
 const svg = 'http://www.w3.org/2000/svg';
 const ring_corners = 40;
@@ -37,7 +37,7 @@ const announced_s = 4; // the wire takes 256 samples
 const announce_again_s = 2;
 const flight_s = 2.5;
 
-const warn = (error: unknown): void => console.warn('no way can be sought', error);
+const warn = (error: unknown): void => console.warn('no path can be searched', error);
 
 interface WalkingParts {
   readonly view: HTMLElement;
@@ -54,7 +54,7 @@ export class Walking {
   private readonly ring_ = document.createElementNS(svg, 'polygon');
   private readonly picture_ = document.createElementNS(svg, 'svg');
   private shown_: Stand | undefined; // in the ring
-  private sought_: Stand | undefined; // a way there
+  private target_: Stand | undefined; // of the path that is searched
   private walks_ = false;
   private eye_: Eye;
   private cancel_announcing_ = (): void => undefined;
@@ -86,7 +86,7 @@ export class Walking {
     this.picture_.remove();
   }
 
-  /** Walks to a place, or flies where the visitor does not walk. */
+  /** Walks there, or flies where the visitor does not walk. */
   async go_to(to: Stand): Promise<void> {
     const { navigation, reduced_motion } = this.parts_;
     const eye = navigation.eye;
@@ -99,16 +99,16 @@ export class Walking {
       return;
     }
     navigation.stop_flight();
-    this.sought_ = to;
+    this.target_ = to;
     const path = await find_path(
       this.map,
       this.walker.stand_at(eye.position),
       to,
-      () => this.sought_ === to,
+      () => this.target_ === to,
     );
     const moved =
       length(sub(navigation.eye.position, eye.position)) > this.map.radius * this.map.cell;
-    if (this.sought_ !== to || moved || path.length === 0) return; // no flight through walls either
+    if (this.target_ !== to || moved || path.length === 0) return; // no flight through walls either
     const way = stroll(this.map, path, navigation.eye);
     this.travel(reduced_motion ? { duration_s: 0, at: () => way.at(way.duration_s) } : way);
     if (reduced_motion) return;
@@ -118,10 +118,10 @@ export class Walking {
 
   /** The visitor wants something else now. */
   stay(): void {
-    this.sought_ = undefined;
+    this.target_ = undefined;
   }
 
-  /** Flies down to a place, and looks level along the heading of `before`. */
+  /** Flies down there, and looks level along the heading of `before`. */
   land(to: Stand, before: Eye): void {
     const { navigation, reduced_motion } = this.parts_;
     const [, north, up] = this.map.axes;
@@ -213,8 +213,8 @@ export class Walking {
       const east = stand.east + ring_cells * Math.cos(angle);
       const north = stand.north + ring_cells * Math.sin(angle);
       const corner: Vec3 = to_world(this.map, { east, north, height: stand.height });
-      const place = place_of(corner, this.eye_, width / Math.max(1, height));
-      return place && ([place[0] * width, place[1] * height] as const);
+      const at = project(corner, this.eye_, width / Math.max(1, height));
+      return at && ([at[0] * width, at[1] * height] as const);
     });
   }
 }

@@ -1,5 +1,5 @@
-// Watching together: one visitor leads, and others see what the leader sees. They watch the leader's own
-// pictures, or follow the leader's camera on a stream of their own where the server has a place for them.
+// A shared tour: participants see what its host sees. They watch the host's own pictures, or follow the host's
+// camera on a stream of their own, if the server has a slot for them.
 import { Signal } from '../base/signal';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, pursuit } from '../camera/flight';
@@ -11,35 +11,35 @@ import { presentation_address } from '../tour/share';
 import { Lead_State, type Lead, type Welcome } from '../wire/wire';
 import type { Pointing } from './pointing';
 
-const { together: words } = text;
+const { shared_tour: words } = text;
 const most_name_bytes = 64; // that the wire takes
 
 /**
- * alone: nobody is led, or the presentation is over. watching: the pictures are the leader's. following:
- * the camera is. left: the visitor looks around and may follow again. leading: others are led from here.
+ * alone: there is no presentation, or it is over. watching: the pictures are the host's. following: the
+ * camera is. left: the visitor looks around and may follow again. presenting: this visitor is the host.
  */
-type Role = 'alone' | 'watching' | 'following' | 'left' | 'leading';
+type Role = 'alone' | 'watching' | 'following' | 'left' | 'presenting';
 
-export class Together {
-  /** The visitor is in no company any more. */
-  readonly parted = new Signal();
+export class SharedTour {
+  /** The visitor takes part no more. */
+  readonly left = new Signal();
   private role_: Role = 'alone';
   private lead_: Lead | undefined;
-  private leader_eye_: Eye | undefined;
+  private host_eye_: Eye | undefined;
   private may_leave_ = false;
-  private leader_gone_ = false; // a card says so
-  private joining_ = false; // on the way from the visitor's own view to the leader's
+  private host_gone_ = false; // a card says so
+  private joining_ = false; // on the way from the visitor's own view to the host's
   private chasing_ = false; // this part replaces its own flight by the next
   private readonly token_ = watch_token(location.href);
   private wants_ = this.token_ !== ''; // to follow; cameras that were sent before the visitor left still arrive
-  private readonly bar_ = by_id('company', HTMLElement);
-  private readonly action_ = by_id('company-action', HTMLButtonElement);
+  private readonly bar_ = by_id('shared-tour', HTMLElement);
+  private readonly action_ = by_id('shared-tour-action', HTMLButtonElement);
   private readonly view_ = by_id('view', HTMLElement);
   private readonly own_label_ = this.view_.getAttribute('aria-label') ?? '';
   private readonly name_ = by_id('present-name', HTMLInputElement);
   private readonly link_ = by_id('present-link', HTMLInputElement);
   private readonly pings_ = by_id('present-pings', HTMLInputElement);
-  private readonly places_ = by_id('present-places', HTMLInputElement);
+  private readonly places_ = by_id('present-positions', HTMLInputElement);
 
   constructor(
     private readonly parts_: Pick<
@@ -52,18 +52,18 @@ export class Together {
     navigation.led = this.token_ !== '';
     worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
     worker.on('state', ({ state }) => {
-      this.leader_gone_ = state.phase === 'waiting' && state.cause === 'no_leader';
+      this.host_gone_ = state.phase === 'waiting' && state.cause === 'no_host';
       this.show();
     });
     worker.on('lead', ({ lead, eye }) => this.heard(lead, eye));
     worker.on('presented', ({ pose, fov_y_rad }) => {
       if (this.role_ !== 'watching') return;
-      this.leader_eye_ = { ...pose, fov_y_rad };
-      pointing_.watch(this.leader_eye_);
+      this.host_eye_ = { ...pose, fov_y_rad };
+      pointing_.watch(this.host_eye_);
     });
     navigation.entered.listen(() => {
-      // Who watched goes on from the leader's view.
-      if (this.role_ === 'watching' && this.leader_eye_) navigation.put(this.leader_eye_);
+      // A visitor who watched continues from the host's view.
+      if (this.role_ === 'watching' && this.host_eye_) navigation.put(this.host_eye_);
     });
     navigation.taken_over.listen(() => {
       if (this.role_ === 'following') this.leave();
@@ -73,7 +73,7 @@ export class Together {
     on_click('present-stop', () => this.stop());
     for (const box of [this.pings_, this.places_]) {
       box.addEventListener('change', () => {
-        if (this.role_ === 'leading') this.tell_present();
+        if (this.role_ === 'presenting') this.tell_present();
       });
     }
     on_click('present-copy', () => void this.copy());
@@ -91,8 +91,8 @@ export class Together {
   private heard(lead: Lead, eye: Eye | undefined): void {
     const before = this.lead_;
     this.lead_ = lead;
-    if (eye) this.leader_eye_ = eye;
-    if (this.role_ === 'leading' || this.role_ === 'watching') this.show();
+    if (eye) this.host_eye_ = eye;
+    if (this.role_ === 'presenting' || this.role_ === 'watching') this.show();
     else if (lead.state === Lead_State.ENDED) {
       if (!lead.elsewhere) this.ended();
       else if (this.wants_) this.go_along();
@@ -100,7 +100,7 @@ export class Together {
     if (this.role_ === 'following' && differ(before, lead)) this.show();
   }
 
-  /** Whoever presents again does not fetch the visitor back. */
+  /** A later presentation does not bring the visitor back. */
   private ended(): void {
     this.wants_ = false;
     this.parts_.worker.post({ kind: 'follow', watch: '' });
@@ -109,9 +109,9 @@ export class Together {
     this.parts_.navigation.stop_flight();
   }
 
-  /** The leader is in another scene. Begins anew there, or watches where the visitor may not go. */
+  /** The host is in another scene. Starts again there, or watches where the visitor may not go. */
   private go_along(): void {
-    this.parts_.notice.show(words.goes_on({ name: this.lead_?.name || words.somebody }), 10);
+    this.parts_.notice.show(words.moved({ name: this.lead_?.name || words.host }), 10);
     this.become('left'); // it comes to follow by the next message
     this.parts_.navigation.stop_flight();
     this.parts_.worker.post({ kind: 'watch', watch: this.token_ });
@@ -133,7 +133,7 @@ export class Together {
 
   private chase(): void {
     const {
-      leader_eye_: to,
+      host_eye_: to,
       parts_: { navigation },
     } = this;
     if (to) this.fly(this.parts_.reduced_motion ? glide(to, to, 0) : pursuit(navigation.eye, to));
@@ -153,7 +153,7 @@ export class Together {
   }
 
   private act(): void {
-    if (this.role_ === 'leading') this.stop();
+    if (this.role_ === 'presenting') this.stop();
     else if (this.role_ === 'left') this.come_back();
     else if (this.role_ === 'watching') this.parts_.worker.post({ kind: 'watch', watch: '' });
     else this.leave();
@@ -173,14 +173,14 @@ export class Together {
 
   private tell_present(): void {
     const name = within_bytes(this.name_.value.trim());
-    const allowed = { pings: this.pings_.checked, tells_places: this.places_.checked };
+    const allowed = { pings: this.pings_.checked, tells_positions: this.places_.checked };
     this.parts_.worker.post({ kind: 'present', on: true, name, ...allowed });
   }
 
   private present(): void {
     this.tell_present();
     this.lead_ = undefined;
-    this.become('leading');
+    this.become('presenting');
     by_id('present-copy', HTMLButtonElement).focus();
   }
 
@@ -190,7 +190,7 @@ export class Together {
       on: false,
       name: '',
       pings: false,
-      tells_places: false,
+      tells_positions: false,
     });
     this.become('alone');
   }
@@ -211,41 +211,41 @@ export class Together {
 
   private become(role: Role): void {
     this.role_ = role;
-    if (role === 'alone' || role === 'left') this.parted.emit();
+    if (role === 'alone' || role === 'left') this.left.emit();
     const watching = role === 'watching';
     document.body.classList.toggle('watching', watching);
     this.parts_.toolbar.watching = watching;
     this.view_.setAttribute('role', watching ? 'img' : 'application');
-    const leading = role === 'leading';
+    const presenting = role === 'presenting';
     for (const id of ['present-link', 'present-copy', 'present-stop'])
-      by_id(id, HTMLElement).hidden = !leading;
-    for (const id of ['present-name', 'present-start']) by_id(id, HTMLElement).hidden = leading;
+      by_id(id, HTMLElement).hidden = !presenting;
+    for (const id of ['present-name', 'present-start']) by_id(id, HTMLElement).hidden = presenting;
     by_id('present-done', HTMLOutputElement).textContent = '';
     this.show();
   }
 
   private show(): void {
-    const name = this.lead_?.name || words.somebody;
+    const name = this.lead_?.name || words.host;
     const count = this.lead_?.company ?? 0;
     const away = this.lead_?.state === Lead_State.AWAY;
-    const leads = count > 1 ? words.leads_several({ name, count }) : words.leads({ name });
+    const presents = count > 1 ? words.presents_to({ name, count }) : words.presents({ name });
     const said: Readonly<Record<Role, string>> = {
       alone: '',
-      watching: this.leader_gone_ ? '' : away ? words.away({ name }) : leads,
-      following: away ? words.away({ name }) : leads,
-      left: '', // nobody tells those who left whether the leader still leads
-      leading: words.you_lead({ count }),
+      watching: this.host_gone_ ? '' : away ? words.away({ name }) : presents,
+      following: away ? words.away({ name }) : presents,
+      left: '', // the server does not tell those who left whether the host still presents
+      presenting: words.you_present({ count }),
     };
     const action: Readonly<Record<Role, string>> = {
       alone: '',
       watching: this.may_leave_ ? words.leave : '',
       following: words.leave,
-      left: this.lead_?.name ? words.follow({ name }) : words.follow_somebody,
-      leading: words.stop,
+      left: this.lead_?.name ? words.follow({ name }) : words.follow_host,
+      presenting: words.stop,
     };
     this.pointing_.allowed =
-      this.role_ === 'leading' || (this.role_ === 'following' && this.lead_?.mayPing === true);
-    const line = by_id('company-text', HTMLElement);
+      this.role_ === 'presenting' || (this.role_ === 'following' && this.lead_?.mayPing === true);
+    const line = by_id('shared-tour-text', HTMLElement);
     if (line.textContent !== said[this.role_]) line.textContent = said[this.role_];
     this.bar_.hidden = said[this.role_] === '' && action[this.role_] === '';
     this.action_.textContent = action[this.role_];

@@ -15,7 +15,7 @@ interface DollhouseParts {
   readonly worker: WorkerClient;
   readonly navigation: Navigation;
   readonly reduced_motion: boolean;
-  /** The visitor has pointed at a place on the floor. */
+  /** The visitor has pointed at a point on the floor. */
   readonly go_to: (stand: Stand) => void;
 }
 

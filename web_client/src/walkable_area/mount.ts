@@ -1,4 +1,4 @@
-// Walking on the scene's ground, and its floor plan. Both load when somebody needs them.
+// Walking on the walkable area of the scene, and its floor plan. Both load when somebody needs them.
 import { browser_timers } from '../base/clock';
 import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
@@ -11,19 +11,19 @@ import type { TourState } from '../tour/player';
 import type { Stand, WalkMap } from '../walk/walk_map';
 import type { Dollhouse } from './dollhouse';
 import type { PlanPanel } from './plan_panel';
-import { SceneGround } from './scene_ground';
+import { WalkMapLoader } from './walk_map_loader';
 import type { Walking } from './walking';
 
-interface GroundParts extends PageParts {
+interface WalkableAreaParts extends PageParts {
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
 }
 
-const warn = (error: unknown): void => console.warn('the ground cannot be used', error); // the server is away
+const warn = (error: unknown): void => console.warn('the walkable area cannot be used', error); // the server is away
 const idle_after_ms = 2000; // the first picture
 
-export class GroundUse {
-  private readonly ground_: SceneGround;
+export class WalkableArea {
+  private readonly loader_: WalkMapLoader;
   private readonly button_ = by_id('button-plan', HTMLButtonElement);
   private readonly panel_ = by_id('plan-panel', HTMLElement);
   private map_: WalkMap | undefined;
@@ -32,13 +32,13 @@ export class GroundUse {
   private house_: Dollhouse | undefined;
   private tour_: TourState | undefined;
   private eye_: Eye;
-  private people_: readonly Vec3[] = [];
+  private participants_: readonly Vec3[] = [];
   private chose_walk_ = false; // in this scene
   private idle_ = false;
 
-  constructor(private readonly parts_: GroundParts) {
+  constructor(private readonly parts_: WalkableAreaParts) {
     const { navigation, worker, toolbar, seen, token, notice, tour_shown } = parts_;
-    this.ground_ = new SceneGround(token);
+    this.loader_ = new WalkMapLoader(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
     navigation.went_back.listen(() => this.house_?.close());
@@ -71,9 +71,9 @@ export class GroundUse {
       this.show_stops();
     });
     worker.on('presented', () => this.presented());
-    this.ground_.sought.listen(() => notice.show(text.ground.sought, 10));
-    this.ground_.known.listen((map) => {
-      notice.withdraw(text.ground.sought);
+    this.loader_.computing.listen(() => notice.show(text.floor_plan.preparing, 10));
+    this.loader_.known.listen((map) => {
+      notice.withdraw(text.floor_plan.preparing);
       this.button_.hidden = !map;
       if (map === 'large') return;
       this.map_ = map;
@@ -83,36 +83,36 @@ export class GroundUse {
   }
 
   /** Where the eyes of other visitors are, for the plan. */
-  show_people(places: readonly Vec3[]): void {
-    this.people_ = places;
-    this.plan_?.show_people(places);
+  show_participants(positions: readonly Vec3[]): void {
+    this.participants_ = positions;
+    this.plan_?.show_participants(positions);
   }
 
   private enter(scene_id: string): void {
-    this.ground_.enter(scene_id);
+    this.loader_.enter(scene_id);
     this.house_?.close();
     this.house_ = undefined;
     this.map_ = undefined;
     this.walking_?.end();
     this.walking_ = this.plan_ = undefined;
-    this.people_ = [];
+    this.participants_ = [];
     this.parts_.toolbar.close('plan');
     this.panel_.replaceChildren();
     this.button_.hidden = true;
     this.chose_walk_ = this.idle_ = false;
-    if (this.parts_.navigation.camera.mode === 'walk') void this.ground_.want();
+    if (this.parts_.navigation.camera.mode === 'walk') void this.loader_.want();
   }
 
   private presented(): void {
     if (this.idle_) return;
     this.idle_ = true;
-    setTimeout(() => void this.ground_.want(true), idle_after_ms);
+    setTimeout(() => void this.loader_.want(true), idle_after_ms);
   }
 
   private walk(): void {
     const { map_: map } = this;
     if (map) this.make_walking(map).catch(warn);
-    else void this.ground_.want();
+    else void this.loader_.want();
   }
 
   private async make_walking(map: WalkMap): Promise<Walking | undefined> {
@@ -128,17 +128,15 @@ export class GroundUse {
       map,
     );
     // Where the scene or a link begins with walking, visitors first see what its author has chosen.
-    navigation.set_ground(this.walking_.walker, this.chose_walk_);
+    navigation.set_walker(this.walking_.walker, this.chose_walk_);
     return this.walking_;
   }
 
   private async open_plan(): Promise<void> {
     const { map_: map, parts_: parts } = this;
-    if (!map) return void this.ground_.want();
-    const [{ PlanPanel }, { Dollhouse }, { house_around }, walking] = await Promise.all([
-      import('./plan_panel'),
-      import('./dollhouse'),
-      import('../walk/dollhouse'),
+    if (!map) return void this.loader_.want();
+    const [{ PlanPanel, Dollhouse, house_around }, walking] = await Promise.all([
+      import('./plan'),
       this.make_walking(map),
     ]);
     const house = await house_around(map);
@@ -162,7 +160,7 @@ export class GroundUse {
       this.eye_,
     );
     this.plan_.move(this.eye_);
-    this.plan_.show_people(this.people_);
+    this.plan_.show_participants(this.participants_);
     this.show_stops();
   }
 

@@ -4,41 +4,41 @@ import { max_text_characters } from './limits';
 
 const { mistakes } = text;
 
-/** A value of a document that people wrote. Its errors name its place: "tours[0].title: …". */
-export class JsonPlace {
+/** A value of a document that people wrote. Its errors name its path: "tours[0].title: …". */
+export class JsonField {
   constructor(
-    private readonly place_: string,
+    private readonly path_: string,
     private readonly value_: unknown,
   ) {}
 
   fail(what: string): never {
-    throw new Error(`${this.place_}: ${what}`);
+    throw new Error(`${this.path_}: ${what}`);
   }
 
   /** The member; undefined where it is missing or null. */
-  find(key: string): JsonPlace | undefined {
+  find(key: string): JsonField | undefined {
     if (typeof this.value_ !== 'object' || this.value_ === null) this.fail(mistakes.not_an_object);
     const value = (this.value_ as Record<string, unknown>)[key];
     if (value === undefined || value === null) return undefined;
-    return new JsonPlace(`${this.place_}.${key}`, value);
+    return new JsonField(`${this.path_}.${key}`, value);
   }
 
-  at(key: string): JsonPlace {
+  at(key: string): JsonField {
     return this.find(key) ?? this.fail(mistakes.missing({ member: key }));
   }
 
-  elements(most: number): JsonPlace[] {
+  elements(most: number): JsonField[] {
     if (!Array.isArray(this.value_)) this.fail(mistakes.not_a_list);
     if (this.value_.length > most)
       this.fail(mistakes.too_many({ count: this.value_.length, most }));
-    return this.value_.map((value, i) => new JsonPlace(`${this.place_}[${i}]`, value));
+    return this.value_.map((value, i) => new JsonField(`${this.path_}[${i}]`, value));
   }
 
-  members(most: number): [name: string, value: JsonPlace][] {
+  members(most: number): [name: string, value: JsonField][] {
     if (typeof this.value_ !== 'object' || this.value_ === null) this.fail(mistakes.not_an_object);
     const members = Object.entries(this.value_);
     if (members.length > most) this.fail(mistakes.too_many({ count: members.length, most }));
-    return members.map(([name, value]) => [name, new JsonPlace(`${this.place_}.${name}`, value)]);
+    return members.map(([name, value]) => [name, new JsonField(`${this.path_}.${name}`, value)]);
   }
 
   /** The text, cut off at the limit. */

@@ -41,7 +41,7 @@ beforeEach(() => {
       stats: ignore,
       picked: ignore,
       pinged: ignore,
-      company: ignore,
+      participants: ignore,
       stayed: ignore,
     },
     {
@@ -69,7 +69,7 @@ function go_live(): void {
   socket(0).say({ case: 'welcome', value: { resumeToken: 'again' } });
 }
 
-describe('a session in company', () => {
+describe('a session in a shared tour', () => {
   it('watches where it has no place, and follows and leads on a stream of its own, also after a loss', () => {
     session.keep({ case: 'follow', value: { watch: 'w' } });
     session.greet_anew({ watch: 'w', follow: true });
@@ -84,7 +84,7 @@ describe('a session in company', () => {
       case: 'error',
       value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true },
     });
-    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'no_leader' });
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'no_host' });
     session.retry();
     socket(1).events.opened();
     expect(socket(1).sent('hello')[0]).toMatchObject({ watch: 'w' });

@@ -6,7 +6,7 @@ import { max_media_bytes } from '../tour/limits';
 import { kind_of, type MediaKind } from '../tour/media';
 import { refusal } from '../tour/save';
 
-export class MediaShelf {
+export class MediaFolder {
   /** Names of the files that are there. */
   names: readonly string[] = [];
 
@@ -48,20 +48,20 @@ export class MediaShelf {
 }
 
 /** A name that the server takes and that no other file has. Pure. */
-export function free_name(wish: string, taken: readonly string[]): string {
-  const dot = wish.lastIndexOf('.');
+export function free_name(name: string, taken: readonly string[]): string {
+  const dot = name.lastIndexOf('.');
   const plain = (part: string): string =>
     part
       .normalize('NFKD')
       .replace(/\p{M}/gu, '')
       .replace(/[^\w-]+/g, '-')
       .replace(/^-+|-+$/g, '');
-  const stem = plain(dot > 0 ? wish.slice(0, dot) : wish).slice(0, 80) || 'file';
-  const extension = dot > 0 ? `.${plain(wish.slice(dot + 1)).toLowerCase()}` : '';
+  const stem = plain(dot > 0 ? name.slice(0, dot) : name).slice(0, 80) || 'file';
+  const extension = dot > 0 ? `.${plain(name.slice(dot + 1)).toLowerCase()}` : '';
   const there = new Set(taken.map((name) => name.toLowerCase()));
   for (let n = 1; ; ++n) {
-    const name = `${stem}${n > 1 ? `-${n}` : ''}${extension}`;
-    if (!there.has(name.toLowerCase())) return name;
+    const free = `${stem}${n > 1 ? `-${n}` : ''}${extension}`;
+    if (!there.has(free.toLowerCase())) return free;
   }
 }
 

@@ -8,15 +8,15 @@ const most_idle_bytes = 1_000_000;
 const patience_ms = 10 * 60_000; // the server computes one scene at a time
 const usual_wait_s = 5;
 
-export class SceneGround {
-  /** The ground of the scene is known; undefined: nobody can walk in it; 'large': it comes when it is wanted. */
+export class WalkMapLoader {
+  /** The map of the scene is there; undefined: nobody can walk in it; 'large': it comes when it is wanted. */
   readonly known = new Signal<WalkMap | 'large' | undefined>();
-  /** Somebody waits for the ground, and the server still seeks it. Comes once a scene. */
-  readonly sought = new Signal();
+  /** Somebody waits for the map, and the server still computes it. Comes once a scene. */
+  readonly computing = new Signal();
   private scene_id_ = '';
   private state_: 'unknown' | 'asked' | 'large' | 'known' = 'unknown';
-  private seeking_: 'no' | 'quietly' | 'told' = 'no';
-  private idle_ = false; // nobody waits for it
+  private wait_: 'no' | 'quietly' | 'told' = 'no';
+  private idle_ = false; // nobody waits for the map
 
   constructor(private readonly token_: AccessToken) {}
 
@@ -24,7 +24,7 @@ export class SceneGround {
   enter(scene_id: string): void {
     this.scene_id_ = scene_id;
     this.state_ = 'unknown';
-    this.seeking_ = 'no';
+    this.wait_ = 'no';
   }
 
   /** `idle`: nobody waits for it. */
@@ -42,7 +42,7 @@ export class SceneGround {
     const scene_id = this.scene_id_;
     this.state_ = 'asked';
     const file = await this.fetch_file(scene_id).catch((error: unknown) => {
-      console.warn('the ground does not come', error);
+      console.warn('the walk map does not come', error);
       return 'unknown' as const; // the next one who needs it asks again
     });
     if (scene_id !== this.scene_id_) return;
@@ -58,9 +58,9 @@ export class SceneGround {
   }
 
   private tell(): void {
-    if (this.state_ !== 'asked' || this.idle_ || this.seeking_ !== 'quietly') return;
-    this.seeking_ = 'told';
-    this.sought.emit();
+    if (this.state_ !== 'asked' || this.idle_ || this.wait_ !== 'quietly') return;
+    this.wait_ = 'told';
+    this.computing.emit();
   }
 
   private async read(file: ArrayBuffer): Promise<WalkMap | undefined> {
@@ -91,7 +91,7 @@ export class SceneGround {
         return 'large';
       }
       if (answer.status !== 202 || scene_id !== this.scene_id_) return undefined;
-      if (this.seeking_ === 'no') this.seeking_ = 'quietly';
+      if (this.wait_ === 'no') this.wait_ = 'quietly';
       this.tell();
       const wait_s = Number(answer.headers.get('retry-after') ?? usual_wait_s);
       await new Promise((resolve) => setTimeout(resolve, wait_s * 1000));
