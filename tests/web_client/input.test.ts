@@ -122,7 +122,7 @@ describe('touch', () => {
     expect(dolly?.steps).toBeCloseTo(1, 9);
   });
 
-  it('ignores a third finger, and goes on looking when one of two is lifted', () => {
+  it('ignores a third finger, and keeps looking when one of two is lifted', () => {
     const pointers = held(finger(1, 100, 100), finger(2, 200, 100), finger(3, 300, 100));
     expect(pointers.move(finger(3, 310, 100), height_px)).toEqual([]);
     pointers.up(1);

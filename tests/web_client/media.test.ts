@@ -159,7 +159,7 @@ describe('sounds', () => {
     expect([voice.plays, background.plays, sounds.audible]).toEqual([false, false, false]);
     let heard = false;
     sounds.when_heard(() => (heard = true));
-    expect(heard).toBe(true); // a tour goes on without what nobody hears
+    expect(heard).toBe(true); // a tour continues without what nobody hears
     sounds.touch();
     expect([voice.plays, background.plays, sounds.audible]).toEqual([true, true, true]);
   });

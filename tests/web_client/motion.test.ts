@@ -216,7 +216,7 @@ describe('inertia', () => {
     return inertia.released(80 + pause_ms);
   };
 
-  it('goes on as fast as the pointer went, and fades', () => {
+  it('continues as fast as the pointer went, and fades', () => {
     const inertia = new Inertia();
     expect(flick(inertia)).toBe(true);
     const first = inertia.step(0.01)!;

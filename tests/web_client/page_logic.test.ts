@@ -79,7 +79,7 @@ describe('access token', () => {
 });
 
 describe('device', () => {
-  it('is told by pointer, screen and headset browsers, and by nothing finer', () => {
+  it('follows from pointer, screen and headset browsers, and from nothing finer', () => {
     const kind = (user_agent: string, coarse_pointer: boolean, screen_px: number): Hello_Device =>
       device_kind({ user_agent, coarse_pointer, screen_px });
     expect(kind('Mozilla/5.0 (X11; Linux x86_64)', false, 1080)).toBe(Hello_Device.DESKTOP);
@@ -314,7 +314,7 @@ describe('wording', () => {
     expect(jpeg_reason(true, true, 'prefer-hardware')).toBeUndefined();
     expect(jpeg_reason(false, false, 'prefer-hardware')).toBe('not_secure');
     expect(jpeg_reason(false, true, 'prefer-hardware')).toBe('no_decoder');
-    expect(jpeg_reason(true, true, 'jpeg')).toBe('failed_lately');
+    expect(jpeg_reason(true, true, 'jpeg')).toBe('failed_recently');
   });
 
   it('names what an old browser lacks', () => {

@@ -80,7 +80,7 @@ describe('a portal', () => {
     });
   });
 
-  it('keeps what the address says of the page, and neither token nor leader', () => {
+  it('keeps what the address says of the page, and neither token nor host', () => {
     const view = { eye: undefined, mode: undefined, tour_index: undefined, stop_index: 1 };
     const address = address_in(
       'https://a.example/x/?scene=town&lang=de&author#watch=w&token=t',
@@ -90,7 +90,7 @@ describe('a portal', () => {
     expect(address).toBe('https://a.example/x/?scene=hall&lang=de&author=#stop=2');
   });
 
-  it('comes along with a leader, and leads to no view of the scene before', () => {
+  it('comes along with a host, and leads to no view of the scene before', () => {
     const led = (hash: string): string =>
       address_led_to(`https://a.example/x/?scene=town&lang=de#${hash}`, 'hall');
     expect(led('watch=w')).toBe('https://a.example/x/?scene=hall&lang=de#watch=w');

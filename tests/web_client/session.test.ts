@@ -269,7 +269,7 @@ describe('errors', () => {
     expect(socket(1).sent('hello')[0]?.token).toBe('better');
   });
 
-  it('passes on what is not fatal and goes on', () => {
+  it('passes on what is not fatal and continues', () => {
     const first = go_live();
     const value = { code: Error_Code.RATE_LIMITED, message: 'slow down', fatal: false };
     first.say({ case: 'error', value });
@@ -330,7 +330,7 @@ describe('drain', () => {
     expect(sockets.length).toBeLessThan(8); // 28 with half a second between two
   });
 
-  it('goes on with the new connection when the old one ends first', () => {
+  it('continues with the new connection when the old one ends first', () => {
     const old = go_live();
     session.send_pose(pose(4n));
     old.say({ case: 'drain', value: {} });

@@ -19,7 +19,7 @@ let sockets: FakeSocket[];
 let session: Session;
 let states: SessionState[];
 let notices: string[];
-let leaders: string[];
+let hosts: string[];
 
 beforeEach(() => {
   time = new FakeTime();
@@ -27,13 +27,13 @@ beforeEach(() => {
   sockets = network.sockets;
   states = [];
   notices = [];
-  leaders = [];
+  hosts = [];
   session = new Session(
     { open: network.open, clock: time, timers: time, random: () => 0.5 },
     {
       state: (state) => states.push(state),
       notice: (message) => notices.push(message),
-      lead: ({ name }) => leaders.push(name),
+      lead: ({ name }) => hosts.push(name),
       welcome: ignore,
       config: ignore,
       frame: ignore,
@@ -79,7 +79,7 @@ describe('a session in a shared tour', () => {
     session.send_pose(pose);
     expect(cases(0)).toEqual(['hello']);
     socket(0).say({ case: 'lead', value: { name: 'Ada' } });
-    expect(leaders).toEqual(['Ada']);
+    expect(hosts).toEqual(['Ada']);
     socket(0).say({
       case: 'error',
       value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true },
@@ -167,7 +167,7 @@ describe('a session in a shared tour', () => {
     expect(last_state()).toEqual({ phase: 'live' });
   });
 
-  it('goes on watching a leader who enters one scene after the other', () => {
+  it('keeps watching a host who enters one scene after the other', () => {
     go_live();
     session.greet_anew({ watch: 'w', follow: true });
     for (let i = 1; i < 8; ++i) {

@@ -28,7 +28,7 @@ describe('the player', () => {
     starts_itself: false,
   };
 
-  /** A camera that flies when it is told to, by hand. */
+  /** A camera that a test flies by hand. */
   function guided(reduced_motion = false) {
     const time = new FakeTime();
     let eye: Eye = { position: [0, 0, 0], orientation: identity, fov_y_rad: 1 };
@@ -128,7 +128,7 @@ describe('the player', () => {
     expect(arrive()).toBe(1);
   });
 
-  it('plays: stays at each stop as long as it says, then goes on', () => {
+  it('plays: stays at each stop as long as it says, then continues', () => {
     const { player, time, arrive, flying, state } = guided();
     player.load([tour]);
     player.play();

@@ -29,7 +29,7 @@ export class Preview {
     this.player_.play_once(() => this.end());
   }
 
-  /** The author goes on from here, so that Escape leads nowhere. */
+  /** The author continues from here, so that Escape leads nowhere. */
   forget(): void {
     this.from_ = undefined;
   }

@@ -17,7 +17,7 @@ export interface PathSample {
 const announced_samples = 64;
 const held_us = 1_000_000; // at the end of a flight the camera stays
 
-/** The part of a flight that begins now, at `from_s`, as the server is told of it. */
+/** The part of a flight that begins now, at `from_s`, as the server hears of it. */
 export function path_of(
   way: Flight,
   from_s: number,

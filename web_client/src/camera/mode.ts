@@ -19,7 +19,7 @@ export interface ModeController {
   turn(by: Quat): void;
   /** Moves the camera as far as the mode allows. `climb`: along up. World axes and units. */
   move(movement: Vec3, climb: number): void;
-  /** Called after each step of the camera; false: it goes on without the visitor. */
+  /** Called after each step of the camera; false: it continues without the visitor. */
   settle?(dt_s: number): boolean;
   /** `steps`: notches of a wheel, > 0 towards the scene. */
   dolly(steps: number): void;

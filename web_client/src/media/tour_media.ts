@@ -8,7 +8,7 @@ import type { TourMediaPart } from '../ui/scene_tours';
 import type { AuthorMedia } from './author_media';
 import type { MediaPart } from './media_part';
 
-/** What is told before the part is loaded, it hears afterwards. */
+/** Calls before the part is loaded are repeated afterwards. */
 export class TourMedia implements TourMediaPart {
   /** The visitor looks at a picture in the whole window. */
   readonly enlarged = new Signal();

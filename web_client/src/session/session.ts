@@ -43,9 +43,9 @@ interface SessionListener {
   pinged(pinged: Pinged): void;
   /** Where all in the shared tour are. */
   participants(company: Company): void;
-  /** The server sent a message for people. The session goes on. */
+  /** The server sent a message for people. The session continues. */
   notice(message: string): void;
-  /** The selected scene cannot be entered: the server says why. The session goes on where it was. */
+  /** The selected scene cannot be entered: the server says why. The session continues where it was. */
   stayed(message: string): void;
 }
 

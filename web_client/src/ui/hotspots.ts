@@ -32,7 +32,7 @@ export class Hotspots {
   /** `eye`: the camera of the view. */
   show({ tour, stop }: TourState, eye: Eye): void {
     if (tour !== this.tour_) this.show_tour(tour);
-    // The tour goes on, and the button of an earlier stop may still have the focus.
+    // The tour continues, and the button of an earlier stop may still have the focus.
     if (stop !== this.stop_) this.host_.classList.add('labels-dismissed');
     this.stop_ = stop;
     for (const { stop: other, button } of this.spots_) {

@@ -68,6 +68,9 @@ export class StatsCharts {
 
   constructor(private readonly host_: HTMLElement) {
     this.charts_ = [this.latency(), this.rates()];
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+      for (const { plot } of this.charts_) plot.redraw();
+    });
     new ResizeObserver(() => {
       const width = this.width();
       for (const { plot } of this.charts_) plot.setSize({ width, height: height_px });

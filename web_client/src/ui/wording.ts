@@ -12,7 +12,7 @@ export interface Card {
   readonly title: string;
   readonly text: string;
   readonly time?: string; // how long it takes: it changes all the time, so it is not read out
-  readonly busy?: boolean; // the page goes on by itself
+  readonly busy?: boolean; // the page continues by itself
   readonly action?: {
     readonly label: string;
     readonly does: 'retry' | 'reload' | 'open' | 'call' | 'look';
@@ -151,8 +151,8 @@ export function jpeg_reason(
   has_webcodecs: boolean,
   is_secure: boolean,
   rung: DecoderRung,
-): 'failed_lately' | 'no_decoder' | 'not_secure' | undefined {
-  if (has_webcodecs) return rung === 'jpeg' ? 'failed_lately' : undefined;
+): 'failed_recently' | 'no_decoder' | 'not_secure' | undefined {
+  if (has_webcodecs) return rung === 'jpeg' ? 'failed_recently' : undefined;
   return is_secure ? 'no_decoder' : 'not_secure';
 }
 
