@@ -24,7 +24,11 @@ beforeAll(async () => {
 });
 
 /** Opens the page by a link of the role. */
-const open_as = (role: string, query = '', options: BrowserContextOptions = windows.desktop): Promise<WatchedPage> =>
+const open_as = (
+  role: string,
+  query = '',
+  options: BrowserContextOptions = windows.desktop,
+): Promise<WatchedPage> =>
   open(`${workshop.url}${query}#token=${access_token(role, key_file)}`, options);
 
 describe('an author', () => {
@@ -42,7 +46,7 @@ describe('an author', () => {
     await page.getByLabel('Title of stop 2').fill('Nearer');
     await page.getByLabel('Title of the tour', { exact: true }).fill('My tour');
     await page.getByRole('button', { name: 'Move stop 2 up' }).click();
-    await page.getByRole('button', { name: 'Begin visits here' }).click();
+    await page.getByRole('button', { name: 'Start visits here' }).click();
     await page.getByLabel('Title of stop 2').focus();
     await page.getByRole('button', { name: 'Show' }).last().click();
     await settle(page);
@@ -60,7 +64,7 @@ describe('an author', () => {
     await page.getByLabel('Title', { exact: true }).fill('The old city');
     await page.getByLabel('Credits').fill('Ada Lovelace');
     await page.getByLabel('Licence').fill('CC-BY-4.0');
-    await page.getByLabel('Visitors begin in').selectOption('Walk');
+    await page.getByLabel('Visitors start in').selectOption('Walk');
     await page.getByLabel('Background').fill('#203040');
     await keep_screenshot(page, 'author-about');
     await page.getByRole('button', { name: 'Save to the server' }).click();
@@ -108,7 +112,10 @@ describe('an author', () => {
       await page.getByLabel(`Title of stop ${n}`).waitFor();
     }
     const focused = (): Promise<string | null> =>
-      page.evaluate(() => document.activeElement!.getAttribute('aria-label') ?? document.activeElement!.textContent);
+      page.evaluate(
+        () =>
+          document.activeElement!.getAttribute('aria-label') ?? document.activeElement!.textContent,
+      );
     await page.getByRole('button', { name: 'Move stop 3 up' }).press('Enter');
     expect(await focused()).toBe('Move stop 2 up');
     await page.keyboard.press('Enter');
@@ -124,7 +131,9 @@ describe('an author', () => {
     expect(await page.getByLabel('Flight, s (1)').inputValue()).toBe('');
     for (let i = 0; i < 20 && (await undo.isEnabled()); ++i) await undo.click();
     expect(await undo.isEnabled()).toBe(false);
-    expect(await page.getByLabel('Title of the tour', { exact: true }).inputValue()).not.toBe('Second');
+    expect(await page.getByLabel('Title of the tour', { exact: true }).inputValue()).not.toBe(
+      'Second',
+    );
   });
 
   it('is back where a preview began, by Escape and at its end', async () => {
@@ -169,7 +178,7 @@ describe('an author', () => {
     ];
     await edit(first, 'By the first');
     await first.getByText('Saved. Visitors get it').waitFor();
-    const replace = second.getByRole('button', { name: 'Replace theirs' });
+    const replace = second.getByRole('button', { name: 'Replace the other version' });
     expect(await replace.isHidden()).toBe(true);
     await edit(second, 'By the second');
     await second.getByText('Not saved: someone else has saved this scene').waitFor();
@@ -196,7 +205,7 @@ describe('an author', () => {
     expect(file.suggestedFilename()).toBe('mine.json');
     const { tours } = JSON.parse(readFileSync(await file.path(), 'utf8')) as { tours: unknown };
     expect(tours).toMatchObject([{ stops: expect.any(Array) as unknown }]);
-    await page.getByText('link of role author').waitFor();
+    await page.getByText('open an author link').waitFor();
   });
 
   const rooms = {
@@ -225,7 +234,11 @@ describe('an author', () => {
     for (const id of ['author-save', 'author-new', 'author-add', 'author-undo']) {
       await page.locator(`#${id}`).scrollIntoViewIfNeeded();
       const { left, right, bottom } = await rect(`#${id}`);
-      expect([left >= panel.left, right <= panel.right, bottom <= panel.bottom + 1], id).toEqual([true, true, true]);
+      expect([left >= panel.left, right <= panel.right, bottom <= panel.bottom + 1], id).toEqual([
+        true,
+        true,
+        true,
+      ]);
     }
   });
 });

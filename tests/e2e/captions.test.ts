@@ -20,7 +20,11 @@ beforeAll(async () => {
 
 const with_captions = (...captions: string[]): Promise<FakeServer> => {
   const stops = captions.map((caption, i) => ({
-    ...{ title: `Stop ${i}`, caption, marker: [i, 0, 0], position: [0, 0, -5], orientation: [0, 0, 0, 1] },
+    title: `Stop ${i}`,
+    caption,
+    marker: [i, 0, 0],
+    position: [0, 0, -5],
+    orientation: [0, 0, 0, 1],
   }));
   return start_fake_server(stream, { tours: [{ title: 'Tour', stops }] });
 };
@@ -44,7 +48,9 @@ describe('a caption', () => {
     await link.waitFor();
     expect(await text.locator('strong').innerText()).toBe('1904');
     expect(await link.evaluate((a: HTMLAnchorElement) => [a.href, a.target, a.rel])).toEqual([
-      'https://archive.example/hall', '_blank', 'noopener noreferrer',
+      'https://archive.example/hall',
+      '_blank',
+      'noopener noreferrer',
     ]);
     expect(await text.innerText()).toContain('Ada Lovelace,\nof stone');
     await keep_screenshot(page, `caption-${name}`);
@@ -75,7 +81,9 @@ it('a hostile caption runs nothing, asks nobody and leads nowhere', async () => 
     await page.locator('#tour-next').click();
     await page.getByRole('heading', { name: `Stop ${i}` }).waitFor();
     await expect.poll(() => text.locator('p, blockquote').count()).toBeGreaterThan(0);
-    const kinds = await text.evaluate((element) => [...new Set([...element.querySelectorAll('*')].map(({ tagName }) => tagName))]);
+    const kinds = await text.evaluate((element) => [
+      ...new Set([...element.querySelectorAll('*')].map(({ tagName }) => tagName)),
+    ]);
     expect(kinds.filter((kind) => !['P', 'STRONG', 'BLOCKQUOTE'].includes(kind))).toEqual([]);
   }
   await page.waitForTimeout(300);

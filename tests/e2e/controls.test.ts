@@ -19,7 +19,10 @@ beforeAll(async () => {
     stream(peer, body);
     if (body.case !== 'pick' || wall_z === undefined) return;
     const { id, origin, direction } = body.value;
-    peer.say({ case: 'picked', value: { id, hit: true, distance: (wall_z - origin!.z) / direction!.z } });
+    peer.say({
+      case: 'picked',
+      value: { id, hit: true, distance: (wall_z - origin!.z) / direction!.z },
+    });
   });
 });
 
@@ -59,7 +62,12 @@ async function change_by(page: Page, action: () => Promise<void>): Promise<Chang
 
 type Axis = 'right' | 'left' | 'down' | 'up' | 'forward' | 'back';
 const along: Readonly<Record<Axis, readonly [index: number, sign: number]>> = {
-  right: [0, 1], left: [0, -1], down: [1, 1], up: [1, -1], forward: [2, 1], back: [2, -1],
+  right: [0, 1],
+  left: [0, -1],
+  down: [1, 1],
+  up: [1, -1],
+  forward: [2, 1],
+  back: [2, -1],
 };
 
 function expect_most(v: Vec3, axis: Axis): void {
@@ -72,13 +80,28 @@ describe('keys', () => {
   it('move and turn the camera, each its way', async () => {
     const page = await open();
     await page.keyboard.press('KeyM'); // fly
-    const moves = { KeyW: 'forward', KeyS: 'back', KeyA: 'left', KeyD: 'right', KeyE: 'up', KeyQ: 'down' } as const;
+    const moves = {
+      KeyW: 'forward',
+      KeyS: 'back',
+      KeyA: 'left',
+      KeyD: 'right',
+      KeyE: 'up',
+      KeyQ: 'down',
+    } as const;
     for (const [key, axis] of Object.entries(moves)) {
       expect_most((await change_by(page, () => page.keyboard.press(key))).moved, axis);
     }
-    const turns = { ArrowLeft: 'left', ArrowRight: 'right', ArrowUp: 'up', ArrowDown: 'down' } as const;
+    const turns = {
+      ArrowLeft: 'left',
+      ArrowRight: 'right',
+      ArrowUp: 'up',
+      ArrowDown: 'down',
+    } as const;
     for (const [key, axis] of Object.entries(turns)) {
-      const { axis: [x, y], moved } = await change_by(page, () => page.keyboard.press(key));
+      const {
+        axis: [x, y],
+        moved,
+      } = await change_by(page, () => page.keyboard.press(key));
       expect_most([x, y, 0], axis);
       expect(Math.hypot(...moved)).toBeLessThan(1e-6);
     }
@@ -126,7 +149,14 @@ describe('keys', () => {
         }),
       );
     }
-    for (const name of ['Orbit', 'Back to the start', 'Quality and view', 'Statistics', 'Share', 'Controls']) {
+    for (const name of [
+      'Orbit',
+      'Back to the start',
+      'Quality and view',
+      'Statistics',
+      'Share',
+      'Controls',
+    ]) {
       expect(names).toContain(name);
     }
   });
@@ -172,14 +202,18 @@ describe('which way is up', () => {
     await page.getByRole('button', { name: 'Quality and view' }).click();
     const up_now = async (): Promise<Vec3> => rotate((await pose_of(page)).orientation, [0, -1, 0]);
     await page.getByRole('button', { name: 'Turn left' }).click(); // the picture's top goes to the left, as the camera's goes to the right
-    await expect.poll(up_now).toEqual([expect.closeTo(1, 6), expect.closeTo(0, 6), expect.closeTo(0, 6)]);
+    await expect
+      .poll(up_now)
+      .toEqual([expect.closeTo(1, 6), expect.closeTo(0, 6), expect.closeTo(0, 6)]);
     await page.getByRole('button', { name: 'Turn right' }).click();
-    await expect.poll(up_now).toEqual([expect.closeTo(0, 6), expect.closeTo(-1, 6), expect.closeTo(0, 6)]);
+    await expect
+      .poll(up_now)
+      .toEqual([expect.closeTo(0, 6), expect.closeTo(-1, 6), expect.closeTo(0, 6)]);
 
-    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    await page.getByRole('button', { name: 'Use the surface in the middle as the floor' }).click();
     await page.getByText('There is no surface in the middle').waitFor();
     wall_z = 0;
-    await page.getByRole('button', { name: 'Stand on what is in the middle' }).click();
+    await page.getByRole('button', { name: 'Use the surface in the middle as the floor' }).click();
     // The wall has become the floor, seen from 30 degrees above it.
     await expect.poll(async () => (await pose_of(page)).position[2]).toBeCloseTo(-2.5, 3);
     expect((await up_now())[2]).toBeCloseTo(-Math.cos(Math.PI / 6), 3);
@@ -205,7 +239,10 @@ describe('speed', () => {
 });
 
 describe('fingers', () => {
-  const swipe = async (touch: CDPSession, at: (t: number) => { x: number; y: number }[]): Promise<void> => {
+  const swipe = async (
+    touch: CDPSession,
+    at: (t: number) => { x: number; y: number }[],
+  ): Promise<void> => {
     await touch.send('Input.dispatchTouchEvent', { type: 'touchStart', touchPoints: at(0) });
     for (const t of [0.25, 0.5, 0.75, 1]) {
       await touch.send('Input.dispatchTouchEvent', { type: 'touchMove', touchPoints: at(t) });
@@ -223,9 +260,18 @@ describe('fingers', () => {
       { x: x - apart, y: 150 },
       { x: x + apart, y: 150 },
     ];
-    expect_most((await change_by(page, () => swipe(touch, (t) => pair(250 + 80 * t, 50)))).moved, 'left');
-    expect_most((await change_by(page, () => swipe(touch, (t) => pair(300, 40 + 60 * t)))).moved, 'forward');
-    expect_most((await change_by(page, () => swipe(touch, (t) => pair(300, 100 - 60 * t)))).moved, 'back');
+    expect_most(
+      (await change_by(page, () => swipe(touch, (t) => pair(250 + 80 * t, 50)))).moved,
+      'left',
+    );
+    expect_most(
+      (await change_by(page, () => swipe(touch, (t) => pair(300, 40 + 60 * t)))).moved,
+      'forward',
+    );
+    expect_most(
+      (await change_by(page, () => swipe(touch, (t) => pair(300, 100 - 60 * t)))).moved,
+      'back',
+    );
     await page.getByRole('button', { name: 'Quality and view' }).tap();
     expect(await page.locator('#quality-panel').isVisible()).toBe(true);
     await page.getByLabel('Field of view').fill('90');
@@ -234,14 +280,16 @@ describe('fingers', () => {
 
   const tap = (page: Page): Promise<void> => page.touchscreen.tap(200, 220);
 
-  it('point at a place by a double tap', async () => {
+  it('look at a point by a double tap', async () => {
     const page = await open(true);
     await tap(page);
     await tap(page);
-    await expect.poll(() => server.peers.at(-1)!.heard.some((body) => body.case === 'pick')).toBe(true);
+    await expect
+      .poll(() => server.peers.at(-1)!.heard.some((body) => body.case === 'pick'))
+      .toBe(true);
   });
 
-  it('walk to a place by one tap', async () => {
+  it('walk to a point by one tap', async () => {
     wall_z = 0;
     const page = await open(true);
     for (const mode of ['Orbit', 'Fly']) await page.getByRole('button', { name: mode }).tap();
@@ -256,15 +304,19 @@ describe('a gamepad', () => {
     const page = await open();
     const set = await plug_in_gamepad(page);
     await page.keyboard.press('KeyM'); // fly
-    const push = (axes: number[], button = -1) => async (): Promise<void> => {
-      const before = await pose_of(page);
-      await set(axes, button);
-      await expect.poll(() => pose_of(page)).not.toEqual(before);
-      await set([0, 0, 0, 0]);
-    };
+    const push =
+      (axes: number[], button = -1) =>
+      async (): Promise<void> => {
+        const before = await pose_of(page);
+        await set(axes, button);
+        await expect.poll(() => pose_of(page)).not.toEqual(before);
+        await set([0, 0, 0, 0]);
+      };
     expect_most((await change_by(page, push([0, -1, 0, 0]))).moved, 'forward');
     expect_most((await change_by(page, push([1, 0, 0, 0]))).moved, 'right');
-    const { axis: [x, y] } = await change_by(page, push([0, 0, 1, 0]));
+    const {
+      axis: [x, y],
+    } = await change_by(page, push([0, 0, 1, 0]));
     expect_most([x, y, 0], 'right');
     expect_most((await change_by(page, push([0, 0, 0, 0], 7))).moved, 'up');
     expect_most((await change_by(page, push([0, 0, 0, 0], 6))).moved, 'down');

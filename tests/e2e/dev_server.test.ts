@@ -30,7 +30,9 @@ afterAll(async () => {
 
 it('talks to the server, and leaves Vite its own socket', async () => {
   const { page } = await new_page();
-  const vite_connected = page.waitForEvent('console', (line) => line.text().includes('[vite] connected'));
+  const vite_connected = page.waitForEvent('console', (line) =>
+    line.text().includes('[vite] connected'),
+  );
   const url = vite.resolvedUrls!.local[0]!;
   await page.goto(`${url}?scene=garden`);
   await page.getByText('Demo city').waitFor();

@@ -25,7 +25,10 @@ beforeAll(async () => {
     ...['--drain-wait', '4', '--drain-deadline', '20'],
   ];
   servers = await Promise.all([start_server(scene, options), start_server(scene, options)]);
-  proxy = await start_haproxy(folder, servers.map((server) => server.port));
+  proxy = await start_haproxy(
+    folder,
+    servers.map((server) => server.port),
+  );
 });
 
 /** Watches every refresh of the page. Keeps the longest time without a new picture, and the messages. */
@@ -50,7 +53,8 @@ function watch_pictures(page: Page): Promise<void> {
 
 const watched = (page: Page): Promise<{ shown: number; longest_ms: number; cards: number }> =>
   page.evaluate(
-    () => (window as unknown as { seen: { shown: number; longest_ms: number; cards: number } }).seen,
+    () =>
+      (window as unknown as { seen: { shown: number; longest_ms: number; cards: number } }).seen,
   );
 
 it('a visitor of a server that drains goes on at the other one', async () => {

@@ -18,14 +18,22 @@ beforeAll(async () => {
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   catgs_render('synth', 'city', scene, '--gaussians', '20000');
   write_tours(path.join(folder, 'town.json'), ({ start_pose, focus }) => {
-    const at = (share: number): number[] => start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
-    const stop = (share: number) => ({ title: `Stop ${share}`, position: at(share), look_at: focus, stay_s: 0.3, fly_s: 0.5 });
+    const at = (share: number): number[] =>
+      start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
+    const stop = (share: number) => ({
+      title: `Stop ${share}`,
+      position: at(share),
+      look_at: focus,
+      stay_s: 0.3,
+      fly_s: 0.5,
+    });
     return [{ title: 'A short film', stops: [stop(0.1), stop(0.2)] }];
   });
   server = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
 });
 
-const link = (role: string, query = ''): string => `${server.url}?author${query}#token=${access_token(role, key_file)}`;
+const link = (role: string, query = ''): string =>
+  `${server.url}?author${query}#token=${access_token(role, key_file)}`;
 
 async function open_panel(page: Page): Promise<void> {
   await page.getByText('Pictures and film').click();
@@ -36,8 +44,8 @@ async function open_panel(page: Page): Promise<void> {
 async function made(page: Page, kind: string, size: string): Promise<Buffer> {
   await page.getByLabel('Kind').selectOption(kind);
   await page.getByLabel('Size').selectOption(size);
-  await page.getByRole('button', { name: 'Make it' }).click();
-  await page.getByText('It is ready.').waitFor({ timeout: 100_000 });
+  await page.getByRole('button', { name: 'Create' }).click();
+  await page.getByText('Ready.').waitFor({ timeout: 100_000 });
   const [download] = await Promise.all([
     page.waitForEvent('download'),
     page.getByRole('link', { name: 'Save it on this device' }).click(),
@@ -64,14 +72,16 @@ describe('an author', () => {
     expect(film.toString('latin1', 4, 8)).toBe('ftyp');
     expect(film.includes('avcC')).toBe(true); // H.264
     await page.getByLabel('Size').selectOption('1920 × 1080');
-    await page.getByRole('button', { name: 'Make it' }).click();
+    await page.getByRole('button', { name: 'Create' }).click();
     await page.getByRole('button', { name: 'Cancel' }).click();
     await page.getByText('Cancelled.').waitFor();
     const [path_file] = await Promise.all([
       page.waitForEvent('download'),
       page.getByRole('button', { name: 'Save the camera path' }).click(),
     ]);
-    const lines = readFileSync(await path_file.path(), 'utf8').trimEnd().split('\n');
+    const lines = readFileSync(await path_file.path(), 'utf8')
+      .trimEnd()
+      .split('\n');
     expect(lines.length).toBe(33); // 1.1 s
     await page.getByText('catgs-render frames').waitFor();
   });
@@ -89,26 +99,38 @@ describe('an author', () => {
 it('a film is made for authors alone, within bounds', async () => {
   const order = (role: string, body: object): Promise<Response> =>
     fetch(`${server.url}api/scenes/town/films`, {
-      ...{ method: 'PUT', body: JSON.stringify(body) },
+      method: 'PUT',
+      body: JSON.stringify(body),
       headers: { authorization: `Bearer ${access_token(role, key_file)}` },
     });
   const wish = { kind: 'film', size: [64, 48], views: [[0, 0, -5, 0, 0, 0, 1, 60], 17_000] };
   expect((await order('viewer', wish)).status).toBe(403);
   const damaged = await order('author', { ...wish, views: [[0, 0, 'far']] });
-  expect([damaged.status, await damaged.text()]).toEqual([400, expect.stringContaining('views[0]')]);
-  const around = await order('author', { kind: 'panorama', size: [256, 128], views: [[0, -2, -9, 0, 0, 0, 1, 90]] });
+  expect([damaged.status, await damaged.text()]).toEqual([
+    400,
+    expect.stringContaining('views[0]'),
+  ]);
+  const around = await order('author', {
+    kind: 'panorama',
+    size: [256, 128],
+    views: [[0, -2, -9, 0, 0, 0, 1, 90]],
+  });
   expect(around.status).toBe(202);
   const job = `${server.url}api/films/${((await around.json()) as { id: string }).id}`;
-  await expect.poll(async () => ((await (await fetch(job)).json()) as { state: string }).state).toBe('done');
-  expect(png_size(Buffer.from(await (await fetch(`${job}/file`)).arrayBuffer()))).toEqual([256, 128]);
+  await expect
+    .poll(async () => ((await (await fetch(job)).json()) as { state: string }).state)
+    .toBe('done');
+  expect(png_size(Buffer.from(await (await fetch(`${job}/file`)).arrayBuffer()))).toEqual([
+    256, 128,
+  ]);
   expect((await fetch(`${server.url}api/films/0123456789abcdef0123456789abcdef`)).status).toBe(404);
 });
 
 it('a visitor may save the camera path, and is told who may order', async () => {
   const { page } = await open(link('viewer'), windows.desktop);
   await open_panel(page);
-  await page.getByText('To make one here, open a link of role author.').waitFor();
-  expect(await page.getByRole('button', { name: 'Make it' }).isHidden()).toBe(true);
+  await page.getByText('To create one here, open an author link.').waitFor();
+  expect(await page.getByRole('button', { name: 'Create' }).isHidden()).toBe(true);
   await page.getByLabel('Kind').selectOption('film');
   expect(await page.getByRole('button', { name: 'Save the camera path' }).isVisible()).toBe(true);
 });

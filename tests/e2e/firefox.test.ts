@@ -19,12 +19,27 @@ beforeAll(async () => {
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   const city = make_demo(folder);
   catgs_render('floors', city, path.join(folder, 'city.walk'), '--eye-height', '1.6');
-  server = await start_server(city, ['--scene-folder', folder, '--min-fps', '0', '--token-key-file', key_file]);
+  server = await start_server(city, [
+    '--scene-folder',
+    folder,
+    '--min-fps',
+    '0',
+    '--token-key-file',
+    key_file,
+  ]);
 });
 
 /** Opens the city. `at`: what the address says of the view. */
-async function open(role: string, size: readonly [number, number], query = '', at = ''): Promise<FirefoxPage> {
-  const page = await open_in_firefox(`${server.url}?scene=city${query}#token=${access_token(role, key_file)}${at}`, ...size);
+async function open(
+  role: string,
+  size: readonly [number, number],
+  query = '',
+  at = '',
+): Promise<FirefoxPage> {
+  const page = await open_in_firefox(
+    `${server.url}?scene=city${query}#token=${access_token(role, key_file)}${at}`,
+    ...size,
+  );
   await settle(page);
   return page;
 }
@@ -37,7 +52,7 @@ async function look(page: FirefoxPage, name: string): Promise<void> {
 }
 
 const at_stop = (page: FirefoxPage, place: string): Promise<void> =>
-  page.until(`document.getElementById('tour-place').textContent === '${place}'`);
+  page.until(`document.getElementById('tour-position').textContent === '${place}'`);
 const in_scene = (page: FirefoxPage, title: string): Promise<void> =>
   page.until(`document.getElementById('scene-name').textContent.startsWith('${title}')`);
 
@@ -74,7 +89,9 @@ describe('Firefox', () => {
     await page.drag([480, 300], [120, 40]);
     await settle(page);
     const turned = await pose_of(page);
-    expect(Math.hypot(...turned.orientation.map((v, i) => v - start.orientation[i]!))).toBeGreaterThan(0.05);
+    expect(
+      Math.hypot(...turned.orientation.map((v, i) => v - start.orientation[i]!)),
+    ).toBeGreaterThan(0.05);
 
     await page.click('#tour-play');
     await at_stop(page, '1 of 6');
@@ -87,7 +104,9 @@ describe('Firefox', () => {
 
     await page.press('i');
     await page.until(`document.querySelector('#stats-panel dl')`);
-    expect(await page.evaluate<string>(`document.getElementById('stats-panel').innerText`)).toMatch(/x264|H\.264/);
+    expect(await page.evaluate<string>(`document.getElementById('stats-panel').innerText`)).toMatch(
+      /x264|H\.264/,
+    );
     await look(page, 'statistics');
     expect(page.errors).toEqual([]);
   });
@@ -96,7 +115,8 @@ describe('Firefox', () => {
     const page = await open('viewer', desktop, '', '&stop=3');
     await see_tower(page);
     await look(page, 'media');
-    const muted = (): Promise<boolean> => page.evaluate(`document.querySelector('#tour > audio').muted`);
+    const muted = (): Promise<boolean> =>
+      page.evaluate(`document.querySelector('#tour > audio').muted`);
     expect(await muted()).toBe(true);
     await page.click('#button-sound');
     expect(await muted()).toBe(false);
@@ -139,9 +159,17 @@ describe('Firefox', () => {
     expect(page.errors).toEqual([]);
   });
 
-  it.each([['de', 'ltr'], ['ar', 'rtl']])('reads %s, on a phone', async (language, direction) => {
+  it.each([
+    ['de', 'ltr'],
+    ['ar', 'rtl'],
+  ])('reads %s, on a phone', async (language, direction) => {
     const page = await open('viewer', phone, `&lang=${language}`, '&stop=3');
-    expect(await page.evaluate(() => [document.documentElement.lang, getComputedStyle(document.body).direction])).toEqual([language, direction]);
+    expect(
+      await page.evaluate(() => [
+        document.documentElement.lang,
+        getComputedStyle(document.body).direction,
+      ]),
+    ).toEqual([language, direction]);
     await see_tower(page);
     await look(page, `media-${language}`);
     expect(await colours_of_plan(page)).toBeGreaterThan(4);

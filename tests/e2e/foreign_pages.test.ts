@@ -20,8 +20,11 @@ beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '20000');
   write_tours(path.join(folder, `${hostile}.json`), ({ focus, start_pose }) => {
     const stop = (number: number) => ({
-      ...{ title: `${hostile} ${number}`, caption: `${hostile}</p><script>document.body.dataset.taken=1</script>` },
-      ...{ position: start_pose.position, look_at: focus, marker: focus },
+      title: `${hostile} ${number}`,
+      caption: `${hostile}</p><script>document.body.dataset.taken=1</script>`,
+      position: start_pose.position,
+      look_at: focus,
+      marker: focus,
     });
     return [{ title: hostile, stops: [stop(1), stop(2)] }];
   });
@@ -37,7 +40,10 @@ async function open(url: string): Promise<WatchedPage> {
 
 /** Nothing of what strangers wrote has become a part of the page. */
 const taken = (page: Page): Promise<boolean> =>
-  page.evaluate(() => document.body.dataset['taken'] === '1' || document.querySelector('img[src="x"], b') !== null);
+  page.evaluate(
+    () =>
+      document.body.dataset['taken'] === '1' || document.querySelector('img[src="x"], b') !== null,
+  );
 
 /** Which of them succeed, from the page that is open. */
 const attempts = (page: Page, target: string): Promise<string[]> =>
@@ -63,7 +69,12 @@ const attempts = (page: Page, target: string): Promise<string[]> =>
       websocket: connects,
     };
     const worked = await Promise.all(
-      Object.entries(tries).map(([name, attempt]) => attempt().then(() => name, () => undefined)),
+      Object.entries(tries).map(([name, attempt]) =>
+        attempt().then(
+          () => name,
+          () => undefined,
+        ),
+      ),
     );
     return worked.filter((name) => name !== undefined);
   }, target);
@@ -71,7 +82,13 @@ const attempts = (page: Page, target: string): Promise<string[]> =>
 describe('a page of another site', () => {
   it('reads nothing, saves nothing and opens no connection', async () => {
     const { page: own } = await open(server.url);
-    expect(await attempts(own, server.url)).toEqual(['read', 'read without CORS', 'save', 'image', 'websocket']);
+    expect(await attempts(own, server.url)).toEqual([
+      'read',
+      'read without CORS',
+      'save',
+      'image',
+      'websocket',
+    ]);
     const { page } = await open(foreign.origin);
     expect(await attempts(page, server.url)).toEqual([]);
     expect(server.log()).toContain(`websocket refused: origin ${foreign.origin} is not allowed`);
@@ -102,7 +119,12 @@ describe('a page of another site', () => {
     const looked = await page.evaluate(() => {
       const { viewer: other } = window as unknown as { viewer: Window };
       const pose = { position: [1, 2, 3], orientation: [0, 0, 0, 1] };
-      for (const message of [{ catgs: 'hello' }, { catgs: 'pose', ...pose }, { catgs: 'stop', stop: 1 }, '<b>']) {
+      for (const message of [
+        { catgs: 'hello' },
+        { catgs: 'pose', ...pose },
+        { catgs: 'stop', stop: 1 },
+        '<b>',
+      ]) {
         other.postMessage(message, '*');
       }
       try {
@@ -120,7 +142,12 @@ describe('a page of another site', () => {
     const sneak = await start_other_site(
       `<script>parent.frames[0].postMessage({ catgs: 'stop', stop: 1 }, '*');</script>`,
     );
-    const embeddable = await start_server(scene, ['--embed-origin', foreign.origin, '--min-fps', '0']);
+    const embeddable = await start_server(scene, [
+      '--embed-origin',
+      foreign.origin,
+      '--min-fps',
+      '0',
+    ]);
     const { page, errors } = await open(foreign.origin);
     const frame = page.locator('iframe').first().contentFrame();
     await page.evaluate((src) => {
@@ -132,7 +159,10 @@ describe('a page of another site', () => {
     }, sneak.origin);
     await expect.poll(() => sneak.asked).toContain('/');
     const say = (message: unknown): Promise<void> =>
-      page.evaluate((data) => document.querySelector('iframe')!.contentWindow!.postMessage(data, '*'), message);
+      page.evaluate(
+        (data) => document.querySelector('iframe')!.contentWindow!.postMessage(data, '*'),
+        message,
+      );
     // Nor does the page itself say what it likes.
     for (const message of [
       { catgs: 'stop', stop: -1 },
@@ -193,14 +223,23 @@ it('what gets into the page all the same is stopped by the policy, and the page 
   const asked = foreign.asked.length;
   const violated = await page.evaluate(async (url) => {
     const directives: string[] = [];
-    document.addEventListener('securitypolicyviolation', (event) => directives.push(event.effectiveDirective));
+    document.addEventListener('securitypolicyviolation', (event) =>
+      directives.push(event.effectiveDirective),
+    );
     const add = (html: string): void => {
       document.body.insertAdjacentHTML('beforeend', html);
     };
-    add(`<img src="x" onerror="document.body.dataset.taken=1"><img src="${url}/image"><video src="${url}/film"></video>`);
-    add(`<iframe src="${url}/frame"></iframe><object data="${url}/object"></object><base href="${url}">`);
+    add(
+      `<img src="x" onerror="document.body.dataset.taken=1"><img src="${url}/image"><video src="${url}/film"></video>`,
+    );
+    add(
+      `<iframe src="${url}/frame"></iframe><object data="${url}/object"></object><base href="${url}">`,
+    );
     add(`<form action="${url}/form"><input name="a"></form><p style="color: red">`);
-    for (const [name, value] of [['textContent', 'document.body.dataset.taken=1'], ['src', `${url}/script`]] as const) {
+    for (const [name, value] of [
+      ['textContent', 'document.body.dataset.taken=1'],
+      ['src', `${url}/script`],
+    ] as const) {
       document.body.append(Object.assign(document.createElement('script'), { [name]: value }));
     }
     document.querySelector<HTMLFormElement>('form[action]')!.submit();
@@ -210,14 +249,23 @@ it('what gets into the page all the same is stopped by the policy, and the page 
     return [...new Set(directives)].sort();
   }, foreign.origin);
   expect(violated).toEqual([
-    ...['base-uri', 'connect-src', 'form-action', 'frame-src', 'img-src', 'media-src', 'object-src'],
+    ...[
+      'base-uri',
+      'connect-src',
+      'form-action',
+      'frame-src',
+      'img-src',
+      'media-src',
+      'object-src',
+    ],
     ...['script-src-attr', 'script-src-elem', 'style-src-attr'],
   ]);
   expect(errors.some((error) => error.includes('Content Security Policy'))).toBe(true);
   expect(await page.evaluate(() => document.body.dataset['taken'])).toBe(undefined);
   expect(foreign.asked.length).toBe(asked);
   await page.keyboard.press('PageDown');
-  const place = (): Promise<string | null> => page.evaluate(() => document.getElementById('tour-place')!.textContent);
+  const place = (): Promise<string | null> =>
+    page.evaluate(() => document.getElementById('tour-position')!.textContent);
   await expect.poll(place).toBe('1 of 2'); // locators would wait for the form to be sent
   await settle(page);
 });

@@ -8,7 +8,13 @@ import { Error_Code } from '#client/wire/wire';
 import { barriers } from './support/axe';
 import { keep_screenshot, new_page, windows } from './support/browser';
 import { settle } from './support/camera';
-import { at_hello, refuse, start_fake_server, type FakeServer, type Script } from './support/fake_server';
+import {
+  at_hello,
+  refuse,
+  start_fake_server,
+  type FakeServer,
+  type Script,
+} from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
 let stream: Script;
@@ -21,7 +27,12 @@ beforeAll(async () => {
 
 const several = [
   { id: 'city', title: 'Demo city' },
-  { id: 'hall', title: 'The great hall of the old town', credits: 'Ada Lovelace', licence: 'CC-BY-4.0' },
+  {
+    id: 'hall',
+    title: 'The great hall of the old town',
+    credits: 'Ada Lovelace',
+    licence: 'CC-BY-4.0',
+  },
   { id: 'garden', title: 'garden' },
 ];
 
@@ -30,7 +41,10 @@ interface State {
   readonly query?: string;
   readonly scenes?: readonly Partial<SceneListing>[]; // of the server, which has one otherwise
   readonly tours?: readonly object[]; // of the scene
-  readonly reach: (page: Page, server: FakeServer) => Promise<void>;
+  /** Leads the page into the state. */
+  readonly reach?: (page: Page, server: FakeServer) => Promise<void>;
+  /** Resolves when the page shows it, in the window that it has now. */
+  readonly shown: (page: Page, server: FakeServer) => Promise<void>;
 }
 
 const title =
@@ -38,42 +52,60 @@ const title =
   (page: Page): Promise<void> =>
     page.getByRole('heading', { name: text }).waitFor();
 
-const panel =
-  (button: string) =>
-  async (page: Page): Promise<void> => {
-    await settle(page);
-    await page.locator('#toolbar').getByRole('button', { name: button }).click();
-  };
+const button =
+  (name: string) =>
+  (page: Page): Promise<void> =>
+    page.getByRole('button', { name }).waitFor();
 
-const mode =
-  (presses: number) =>
-  async (page: Page): Promise<void> => {
+const panel = (name: string, id: string): Pick<State, 'reach' | 'shown'> => ({
+  reach: async (page) => {
+    await settle(page);
+    await page.locator('#toolbar').getByRole('button', { name }).click();
+  },
+  shown: (page) => page.locator(`#${id}-panel`).waitFor(),
+});
+
+const mode = (presses: number, name: string): Pick<State, 'reach' | 'shown'> => ({
+  reach: async (page) => {
     await settle(page);
     for (let i = 0; i < presses; ++i) await page.keyboard.press('KeyM');
-  };
+  },
+  shown: (page) => page.locator('#mode-label', { hasText: name }).waitFor(),
+});
 
-const stop = (caption: string): object => ({ title: 'Hall', caption, position: [0, 0, -5], look_at: [0, 0, 0], marker: [0, 0, 2] });
+const stop = (caption: string): object => ({
+  title: 'Hall',
+  caption,
+  position: [0, 0, -5],
+  look_at: [0, 0, 0],
+  marker: [0, 0, 2],
+});
 const tours = [{ title: 'Ground floor', stops: [stop('Built in 1904. '.repeat(30)), stop('')] }];
 
 const states: Readonly<Record<string, State>> = {
-  connecting: { script: () => undefined, reach: title('Connecting') },
+  connecting: { script: () => undefined, shown: title('Connecting') },
   queue: {
     script: at_hello({ case: 'queue', value: { position: 2, estimateS: 45 } }),
-    reach: title('Number 2 in the queue'),
+    shown: title('Number 2 in the queue'),
   },
   'scene-loading': {
     script: at_hello({ case: 'queue', value: { position: 1, estimateS: 20, forScene: true } }),
-    reach: title('Loading the scene'),
+    shown: title('Loading the scene'),
   },
   token: {
-    script: refuse(Error_Code.UNAUTHORIZED, 'this server needs an access token: open the link you were given'),
-    reach: title('Access token needed'),
+    script: refuse(
+      Error_Code.UNAUTHORIZED,
+      'this server needs an access token: open the link you were given',
+    ),
+    shown: title('Access token needed'),
   },
   scenes: {
     scenes: several,
-    reach: async (page) => {
+    shown: async (page) => {
       await page.waitForFunction(() =>
-        [...document.querySelectorAll<HTMLImageElement>('#gallery img')].every((img) => img.naturalWidth > 0),
+        [...document.querySelectorAll<HTMLImageElement>('#gallery img')].every(
+          (img) => img.naturalWidth > 0,
+        ),
       );
     },
   },
@@ -81,70 +113,69 @@ const states: Readonly<Record<string, State>> = {
     scenes: several,
     script: refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here'),
     query: '?scene=nope',
-    reach: async (page) => {
-      await page.getByRole('link', { name: 'garden' }).waitFor();
-    },
+    shown: (page) => page.getByRole('link', { name: 'garden' }).waitFor(),
   },
-  busy: { script: refuse(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'), reach: title('The server is busy') },
-  idle: { script: refuse(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'), reach: title('Paused') },
+  busy: {
+    script: refuse(Error_Code.SERVER_FULL, '16 of 16 sessions are in use'),
+    shown: title('The server is busy'),
+  },
+  idle: {
+    script: refuse(Error_Code.IDLE_TIMEOUT, 'nothing moved for 10 minutes'),
+    shown: title('Paused'),
+  },
   'old-page': {
     script: refuse(Error_Code.UNSUPPORTED_VERSION, 'this server speaks version 2'),
-    reach: title('do not fit together'),
+    shown: title('does not match the server'),
   },
-  view: { reach: settle },
+  view: { shown: settle },
   lost: {
     reach: async (page, server) => {
       await settle(page);
       await server.close();
-      await page.getByRole('button', { name: 'Try now' }).waitFor();
     },
+    shown: button('Try now'),
   },
   broken: {
     reach: async (page) => {
       await settle(page);
-      await page.evaluate(() => window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })));
-      await page.getByRole('button', { name: 'Reload' }).waitFor();
+      await page.evaluate(() =>
+        window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })),
+      );
     },
+    shown: button('Reload'),
   },
-  fly: { reach: mode(1) },
-  walk: { reach: mode(2) },
+  fly: mode(1, 'Fly'),
+  walk: mode(2, 'Walk'),
   tour: {
     tours,
     reach: async (page) => {
       await settle(page);
       await page.getByRole('button', { name: 'Next stop' }).click();
-      await page.getByText('1 of 2').waitFor();
     },
+    shown: (page) => page.getByText('1 of 2').waitFor(),
   },
-  quality: { reach: panel('Quality and view') },
-  share: { reach: panel('Share') },
-  help: { reach: panel('Controls') },
-  author: {
-    query: '?author',
-    reach: async (page) => {
-      await page.getByRole('button', { name: 'Add a stop here' }).waitFor();
-    },
-  },
+  quality: panel('Quality and view', 'quality'),
+  share: panel('Share', 'share'),
+  help: panel('Controls', 'help'),
+  author: { query: '?author', shown: button('Add a stop here') },
   statistics: {
-    reach: async (page) => {
-      await panel('Statistics')(page);
+    ...panel('Statistics', 'stats'),
+    shown: async (page) => {
       await expect.poll(() => page.locator('.uplot canvas').count()).toBe(2);
     },
   },
   'statistics-at-rest': {
-    reach: async (page) => {
-      await panel('Statistics')(page);
-      await page.getByText('The camera rests').waitFor();
-    },
+    ...panel('Statistics', 'stats'),
+    shown: (page) => page.getByText('The camera rests').waitFor(),
   },
   notice: {
-    script: (peer, body) => {
-      stream(peer, body);
+    reach: settle,
+    shown: async (page, server) => {
       const message = 'nothing has moved for 9 minutes: your place goes to others in a minute';
-      if (body.case === 'hello') peer.say({ case: 'error', value: { code: Error_Code.IDLE_TIMEOUT, message, fatal: false } });
-    },
-    reach: async (page) => {
-      await settle(page);
+      server.peers[0]!.say({
+        case: 'error',
+        value: { code: Error_Code.IDLE_TIMEOUT, message, fatal: false },
+      });
       await page.locator('#notice').waitFor();
     },
   },
@@ -159,20 +190,54 @@ const misplaced = (page: Page): Promise<string[]> =>
       if (width === 0) return []; // hidden
       const outside = left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
       const on_bar =
-        element.id !== 'toolbar' && left < bar.right && right > bar.left && bottom > bar.top && top < bar.bottom;
-      return [...(outside ? [`${element.id} leaves the window`] : []), ...(on_bar ? [`${element.id} lies on the toolbar`] : [])];
+        element.id !== 'toolbar' &&
+        left < bar.right &&
+        right > bar.left &&
+        bottom > bar.top &&
+        top < bar.bottom;
+      return [
+        ...(outside ? [`${element.id} leaves the window`] : []),
+        ...(on_bar ? [`${element.id} lies on the toolbar`] : []),
+      ];
     });
   });
 
-describe.each(Object.entries(windows))('%s', (name, options) => {
-  it.each(Object.entries(states))('shows the state %s whole', async (state, { reach, query = '', script = stream, ...rest }) => {
-    const server = await start_fake_server(script, { scenes: several.slice(0, 1), poster, ...rest });
-    const { page, errors } = await new_page(options);
-    await page.goto(server.url + query);
-    await reach(page, server);
-    await keep_screenshot(page, `state-${state}-${name}`);
-    expect(await misplaced(page)).toEqual([]);
-    expect(await barriers(page)).toEqual([]);
-    if (state !== 'lost') expect(errors).toEqual([]);
-  });
+/** The windows of one kind of pointer. One page takes their sizes and colours in turn. */
+const contexts = {
+  mouse: ['desktop', 'desktop-dark'],
+  touch: ['phone', 'phone-dark'],
+} as const satisfies Record<string, readonly (keyof typeof windows)[]>;
+
+async function take_window(page: Page, name: keyof typeof windows): Promise<void> {
+  const { viewport, ...rest } = windows[name];
+  await page.setViewportSize(viewport);
+  await page.emulateMedia({ colorScheme: 'colorScheme' in rest ? rest.colorScheme : 'light' });
+  // The page has laid itself out anew.
+  await page.evaluate(
+    () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))),
+  );
+}
+
+describe.each(Object.entries(contexts))('%s', (_, names) => {
+  it.each(Object.entries(states))(
+    'shows the state %s whole',
+    async (state, { reach, shown, query = '', script = stream, ...rest }) => {
+      const server = await start_fake_server(script, {
+        scenes: several.slice(0, 1),
+        poster,
+        ...rest,
+      });
+      const { page, errors } = await new_page(windows[names[0]]);
+      await page.goto(server.url + query);
+      await reach?.(page, server);
+      for (const name of names) {
+        await take_window(page, name);
+        await shown(page, server);
+        await keep_screenshot(page, `state-${state}-${name}`);
+        expect(await misplaced(page), name).toEqual([]);
+        expect(await barriers(page), name).toEqual([]);
+      }
+      if (state !== 'lost') expect(errors).toEqual([]);
+    },
+  );
 });

@@ -127,7 +127,9 @@ it(
     // Pictures changed their size at each stop, and the same decoder went on. A connection that a busy
     // machine lost needs a new one.
     const { VideoDecoder: decoders, WebSocket: connections } = await made();
-    console.log(`${rounds} rounds of use; made anew: ${decoders} decoders, ${connections} connections`);
+    console.log(
+      `${rounds} rounds of use; made anew: ${decoders} decoders, ${connections} connections`,
+    );
     expect(decoders).toBeLessThanOrEqual(connections);
     expect(errors).toEqual([]);
   },

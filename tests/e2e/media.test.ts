@@ -16,7 +16,12 @@ const scene = path.join(folder, 'hall.ply');
 const key_file = path.join(folder, 'key');
 const windows: Readonly<Record<string, BrowserContextOptions>> = {
   desktop: { viewport: { width: 1280, height: 800 }, colorScheme: 'light' },
-  phone: { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true, colorScheme: 'light' },
+  phone: {
+    viewport: { width: 390, height: 844 },
+    hasTouch: true,
+    isMobile: true,
+    colorScheme: 'light',
+  },
 };
 
 let server: RunningServer;
@@ -33,12 +38,18 @@ beforeAll(async () => {
 });
 
 /** The address of the page by a link of the role. */
-const link = (role: string, query = ''): string => `${server.url}${query}#token=${access_token(role, key_file)}`;
+const link = (role: string, query = ''): string =>
+  `${server.url}${query}#token=${access_token(role, key_file)}`;
 
 /** A page whose visitor has not touched it yet, whatever the test has looked at. */
-async function open_untouched(address: string, options?: BrowserContextOptions): Promise<WatchedPage> {
+async function open_untouched(
+  address: string,
+  options?: BrowserContextOptions,
+): Promise<WatchedPage> {
   const watched = await new_page(options);
-  await watched.page.addInitScript(() => Object.defineProperty(navigator, 'userActivation', { value: { hasBeenActive: false } }));
+  await watched.page.addInitScript(() =>
+    Object.defineProperty(navigator, 'userActivation', { value: { hasBeenActive: false } }),
+  );
   await watched.page.goto(address);
   await settle(watched.page);
   return watched;
@@ -50,7 +61,11 @@ interface Heard {
   readonly time_s: number;
 }
 const voice = (page: Page): Promise<Heard> =>
-  page.locator('#tour > audio').evaluate((audio: HTMLAudioElement) => ({ paused: audio.paused, muted: audio.muted, time_s: audio.currentTime }));
+  page.locator('#tour > audio').evaluate((audio: HTMLAudioElement) => ({
+    paused: audio.paused,
+    muted: audio.muted,
+    time_s: audio.currentTime,
+  }));
 
 describe('an author', () => {
   it('adds a picture, a film, a voice and a sound', async () => {
@@ -60,20 +75,30 @@ describe('an author', () => {
     await page.getByLabel('Caption of stop 1').fill('Its roof is of oak.');
     await page.getByText('Pictures, films, voice').click();
     const send = (label: string, name: string, buffer: Buffer): Promise<void> =>
-      page.locator(`input[type=file][aria-label="Upload: ${label}"]`).setInputFiles({ name, buffer, mimeType: '' });
+      page
+        .locator(`input[type=file][aria-label="Upload: ${label}"]`)
+        .setInputFiles({ name, buffer, mimeType: '' });
 
     // The server's reason for a refusal is there, and nothing else has changed.
-    await send('Add a picture, film or sound', 'drawing.png', Buffer.from('<svg xmlns="http://www.w3.org/2000/svg"/>'));
-    await page.getByText('Not kept: drawing.png: is of no format').waitFor();
+    await send(
+      'Add a picture, film or sound',
+      'drawing.png',
+      Buffer.from('<svg xmlns="http://www.w3.org/2000/svg"/>'),
+    );
+    await page.getByText('Not added: drawing.png: is of no format').waitFor();
     await send('Add a picture, film or sound', 'The roof.jpg', jpeg);
     await page.getByLabel('What The-roof.jpg shows').fill('The roof seen from below');
     await send('Add a picture, film or sound', 'opening.webm', film);
     await page.getByLabel('What opening.webm shows').waitFor();
     await send('Voice', 'guide.wav', tone(20));
     await send('Captions of guide.wav', 'guide.vtt', Buffer.from(captions));
-    await expect.poll(() => page.getByLabel('Captions of guide.wav', { exact: true }).inputValue()).toBe('guide.vtt');
+    await expect
+      .poll(() => page.getByLabel('Captions of guide.wav', { exact: true }).inputValue())
+      .toBe('guide.vtt');
     await send('Sound of the tour', 'sea.wav', tone(3));
-    await expect.poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue()).toBe('sea.wav');
+    await expect
+      .poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue())
+      .toBe('sea.wav');
     await page.getByLabel('Volume').fill('0.4');
     await page.locator('#author-sound').scrollIntoViewIfNeeded();
     await keep_screenshot(page, 'media-author-sound');
@@ -96,10 +121,14 @@ describe('a visitor', () => {
     expect(await sound.getAttribute('aria-label')).toBe('Sound on');
     await page.locator('#tour-next').click();
     const picture = page.getByAltText('The roof seen from below');
-    await expect.poll(() => picture.evaluate((img: HTMLImageElement) => img.naturalWidth)).toBe(640);
+    await expect
+      .poll(() => picture.evaluate((img: HTMLImageElement) => img.naturalWidth))
+      .toBe(640);
     await expect.poll(async () => (await voice(page)).time_s).toBeGreaterThan(0);
     expect(await voice(page)).toMatchObject({ paused: false, muted: false });
-    await expect.poll(() => page.locator('#tour-words').innerText()).toBe('This hall was built in 1904.');
+    await expect
+      .poll(() => page.locator('#tour-words').innerText())
+      .toBe('This hall was built in 1904.');
     expect(await sound.getAttribute('aria-label')).toBe('Mute');
     await settle(page);
     await keep_screenshot(page, `media-visitor-${name}`);
@@ -122,7 +151,9 @@ describe('a visitor', () => {
     const shown = page.locator('#tour-media video');
     await shown.scrollIntoViewIfNeeded();
     await shown.evaluate((video: HTMLVideoElement) => video.play());
-    await expect.poll(() => shown.evaluate((video: HTMLVideoElement) => video.currentTime)).toBeGreaterThan(0);
+    await expect
+      .poll(() => shown.evaluate((video: HTMLVideoElement) => video.currentTime))
+      .toBeGreaterThan(0);
     expect(errors).toEqual([]);
   });
 
@@ -159,11 +190,22 @@ describe('a visitor', () => {
   });
 
   it('finds words in place of what cannot be shown', async () => {
-    const stops = [{
-      ...{ title: 'Gone', position: [0, 0, -5], orientation: [0, 0, 0, 1], narration: { src: 'gone.mp3' } },
-      media: [{ src: 'gone.jpg', alt: 'A lost picture' }, { src: 'https://elsewhere.example/spy.jpg', alt: 'A foreign one' }],
-    }];
-    writeFileSync(path.join(folder, 'hall.json'), JSON.stringify({ tours: [{ stops: [...stops, ...stops] }] }));
+    const stops = [
+      {
+        title: 'Gone',
+        position: [0, 0, -5],
+        orientation: [0, 0, 0, 1],
+        narration: { src: 'gone.mp3' },
+        media: [
+          { src: 'gone.jpg', alt: 'A lost picture' },
+          { src: 'https://elsewhere.example/spy.jpg', alt: 'A foreign one' },
+        ],
+      },
+    ];
+    writeFileSync(
+      path.join(folder, 'hall.json'),
+      JSON.stringify({ tours: [{ stops: [...stops, ...stops] }] }),
+    );
     const other = await start_server(scene);
     const { page } = await open(other.url, windows['desktop']);
     await page.locator('#tour-next').click();

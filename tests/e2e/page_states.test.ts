@@ -27,15 +27,18 @@ describe('files', () => {
     const files = (await readdir(folder)).map((name) => path.join(folder, name));
     const index = await readFile(path.join(web_dist, 'index.html'), 'utf8');
     const packed = await Promise.all(
-      files.map(async (file) => [path.basename(file), gzipSync(await readFile(file)).length] as const),
+      files.map(
+        async (file) => [path.basename(file), gzipSync(await readFile(file)).length] as const,
+      ),
     );
     type Kind = 'language' | 'first' | 'visitors' | 'tools';
     const kind_of = (file: string): Kind => {
       if (languages.some((language) => file.startsWith(`${language}-`))) return 'language';
       if (index.includes(file) || file.startsWith('worker-')) return 'first';
-      return /^(stats_charts|author_media|film_panel)-/.test(file) ? 'tools' : 'visitors';
+      return /^(stats_charts|author_media|film_panel|console)-/.test(file) ? 'tools' : 'visitors';
     };
-    const sizes = (kind: Kind): number[] => packed.flatMap(([file, bytes]) => (kind_of(file) === kind ? [bytes] : []));
+    const sizes = (kind: Kind): number[] =>
+      packed.flatMap(([file, bytes]) => (kind_of(file) === kind ? [bytes] : []));
     const total = (...all: number[]): number => all.reduce((sum, bytes) => sum + bytes, 0);
     const first = total(gzipSync(index).length, ...sizes('first'));
     const visitors = total(first, ...sizes('visitors'));
@@ -106,7 +109,10 @@ describe('page', () => {
   it('asks for a token when its own is refused, and uses the one that is entered', async () => {
     const server = await start_fake_server((peer, body) => {
       const is_wrong = body.case === 'hello' && body.value.token !== 'right';
-      (is_wrong ? refuse(Error_Code.UNAUTHORIZED, 'the access token is not valid') : stream)(peer, body);
+      (is_wrong ? refuse(Error_Code.UNAUTHORIZED, 'the access token is not valid') : stream)(
+        peer,
+        body,
+      );
     });
     const { page } = await new_page();
     await page.goto(`${server.url}#token=wrong`);
@@ -122,16 +128,22 @@ describe('page', () => {
     await settle(page);
     expect(await page.locator('#toolbar').getAttribute('inert')).toBeNull();
     await page.getByRole('button', { name: 'Share' }).click();
-    await page.getByText('Your access token is not in it').waitFor();
+    await page.getByText('does not contain your access token').waitFor();
     expect(await page.getByLabel('Link to this view').inputValue()).not.toContain('right');
     await keep_screenshot(page, 'fake-token-share');
   });
 
   it('leads from a scene that does not exist to those that do', async () => {
-    const server = await start_fake_server((peer, body) => {
-      const is_wrong = body.case === 'hello' && body.value.sceneId === 'nope';
-      (is_wrong ? refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here') : stream)(peer, body);
-    }, { scenes });
+    const server = await start_fake_server(
+      (peer, body) => {
+        const is_wrong = body.case === 'hello' && body.value.sceneId === 'nope';
+        (is_wrong ? refuse(Error_Code.UNKNOWN_SCENE, 'there is no scene "nope" here') : stream)(
+          peer,
+          body,
+        );
+      },
+      { scenes },
+    );
     const { page } = await new_page();
     await page.goto(`${server.url}?scene=nope`);
     await page.getByText('No such scene').waitFor();
@@ -150,7 +162,7 @@ describe('page', () => {
       expect.stringMatching(/^The hall\s+Ada · MIT$/),
       'garden',
     ]);
-    expect(server.peers).toEqual([]); // no place is taken
+    expect(server.peers).toEqual([]); // no slot is taken
     await page.keyboard.press('Tab');
     await page.keyboard.press('Enter');
     await page.waitForURL(`${server.url}?author=&scene=city`);
@@ -175,7 +187,9 @@ describe('page', () => {
     const server = await start_fake_server(stream);
     const { page } = await open(server.url);
     const framed = (): Promise<boolean> =>
-      page.evaluate(() => getComputedStyle(document.querySelector('#view')!, '::after').content !== 'none');
+      page.evaluate(
+        () => getComputedStyle(document.querySelector('#view')!, '::after').content !== 'none',
+      );
     await page.mouse.click(200, 200);
     await page.keyboard.press('KeyW');
     expect(await framed()).toBe(false);
@@ -191,14 +205,18 @@ describe('page', () => {
     await button.focus();
     await page.keyboard.press('Enter');
     await page.keyboard.press('Tab');
-    expect(await page.getByLabel('Link to this view').evaluate((link: Element) => link === document.activeElement)).toBe(true);
+    expect(
+      await page
+        .getByLabel('Link to this view')
+        .evaluate((link: Element) => link === document.activeElement),
+    ).toBe(true);
     await page.keyboard.press('Tab');
     await page.keyboard.press('Escape');
     expect(await page.locator('#share-panel').isHidden()).toBe(true);
     expect(await button.evaluate((element) => element === document.activeElement)).toBe(true);
   });
 
-  it('has the place in the queue in its title, and calls who is not looking', async () => {
+  it('has the position in the queue in its title, and calls visitors who look elsewhere', async () => {
     let admit = (): void => undefined;
     const server = await start_fake_server((peer, body) => {
       if (body.case !== 'hello') return stream(peer, body);
@@ -276,7 +294,9 @@ describe('page', () => {
     const server = await start_fake_server(stream);
     const { page } = await open(server.url, { viewport, hasTouch: true, isMobile: true });
     const panels = (): Promise<string[]> =>
-      page.evaluate(() => [...document.querySelectorAll('.panel:not([hidden])')].map((panel) => panel.id));
+      page.evaluate(() =>
+        [...document.querySelectorAll('.panel:not([hidden])')].map((panel) => panel.id),
+      );
     await page.getByRole('button', { name: 'Statistics' }).tap();
     await page.getByRole('button', { name: 'Controls' }).tap();
     expect(await panels()).toEqual(['help-panel']);
@@ -284,7 +304,8 @@ describe('page', () => {
     await page.getByRole('button', { name: 'Statistics' }).tap();
     expect(await panels()).toEqual(['stats-panel']);
     const panel = page.locator('#stats-panel');
-    const goes_on = (): Promise<boolean> => panel.evaluate((e) => e.classList.contains('more-below'));
+    const goes_on = (): Promise<boolean> =>
+      panel.evaluate((e) => e.classList.contains('more-below'));
     await expect.poll(() => panel.locator('.uplot canvas').count()).toBe(2);
     await expect.poll(goes_on).toBe(true);
     await panel.evaluate((e) => e.scrollTo(0, e.scrollHeight));

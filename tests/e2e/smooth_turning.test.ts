@@ -97,7 +97,12 @@ async function captures_while_turning(page: Page, count: number): Promise<Captur
 }
 
 /** Median shift of blocks between each capture and what catgs-render draws for that camera. */
-async function errors_px(page: Page, name: string, shots: Capture[], camera: 'drawn' | 'now'): Promise<number[]> {
+async function errors_px(
+  page: Page,
+  name: string,
+  shots: Capture[],
+  camera: 'drawn' | 'now',
+): Promise<number[]> {
   const errors: number[] = [];
   for (const [i, shot] of shots.entries()) {
     const out = path.join(folder, `${name}-${i}`);
@@ -130,8 +135,14 @@ it('things stay where they are while the camera turns over a slow link', async (
     values.map((v) => v.toFixed(digits)).join(' ');
   console.log(
     `at ${deg_per_s} deg/s and ${2 * delay_each_way_ms} ms: registration ${list(errors, 2)} px, ` +
-      `uncovered ${list(uncovered.map((v) => 100 * v), 2)} % at lags of ` +
-      `${list(captures.map(({ lag_deg }) => lag_deg), 1)} deg; ` +
+      `uncovered ${list(
+        uncovered.map((v) => 100 * v),
+        2,
+      )} % at lags of ` +
+      `${list(
+        captures.map(({ lag_deg }) => lag_deg),
+        1,
+      )} deg; ` +
       `without warp ${list(without, 1)} px (nan: beyond the search)`,
   );
   expect(errors.every(Number.isFinite)).toBe(true);

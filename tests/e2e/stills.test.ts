@@ -7,7 +7,14 @@ import { axis_angle, multiply } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
 import { choose_full_size, keep_screenshot, open } from './support/browser';
 import { pose_of, settle } from './support/camera';
-import { coverage, mean_colour, psnr_db, read_png, settled_picture, type Picture } from './support/pictures';
+import {
+  coverage,
+  mean_colour,
+  psnr_db,
+  read_png,
+  settled_picture,
+  type Picture,
+} from './support/pictures';
 import { catgs_render, start_server } from './support/programs';
 import { scratch_folder, write_patches, write_tum } from './support/scenes';
 
@@ -73,8 +80,22 @@ describe('stills', () => {
 // Primaries, secondaries, greys and a skin tone. A wrong matrix or range moves at least one of them by
 // far more than the bound.
 const colours = [
-  ...[[255, 0, 0], [0, 255, 0], [0, 0, 255], [0, 255, 255], [255, 0, 255], [255, 255, 0]],
-  ...[[255, 255, 255], [128, 128, 128], [32, 32, 32], [224, 172, 140], [96, 108, 32], [20, 120, 130]],
+  ...[
+    [255, 0, 0],
+    [0, 255, 0],
+    [0, 0, 255],
+    [0, 255, 255],
+    [255, 0, 255],
+    [255, 255, 0],
+  ],
+  ...[
+    [255, 255, 255],
+    [128, 128, 128],
+    [32, 32, 32],
+    [224, 172, 140],
+    [96, 108, 32],
+    [20, 120, 130],
+  ],
 ] as [number, number, number][];
 const columns = 4;
 const spacing_px = 120; // between centres; a spot's standard deviation is a quarter of it
@@ -84,7 +105,13 @@ describe('colours', () => {
   const patches = colours.map((rgb, i) => {
     const x_px = ((i % columns) - (columns - 1) / 2) * spacing_px;
     const y_px = (Math.floor(i / columns) - 1) * spacing_px;
-    return { rgb, x: x_px / focal_px, y: y_px / focal_px, x_px: size[0] / 2 + x_px, y_px: size[1] / 2 + y_px };
+    return {
+      rgb,
+      x: x_px / focal_px,
+      y: y_px / focal_px,
+      x_px: size[0] / 2 + x_px,
+      y_px: size[1] / 2 + y_px,
+    };
   });
 
   it.each([

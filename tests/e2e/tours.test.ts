@@ -13,7 +13,9 @@ import { start_other_site } from './support/other_site';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
 import { scratch_folder, write_tours } from './support/scenes';
 
-const settings_file = fileURLToPath(new URL('../support/supersplat_settings.json', import.meta.url));
+const settings_file = fileURLToPath(
+  new URL('../support/supersplat_settings.json', import.meta.url),
+);
 const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
 
@@ -26,8 +28,13 @@ beforeAll(async () => {
     const between = (share: number): number[] =>
       start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
     const stop = (title: string, caption: string, share: number) => ({
-      ...{ title, caption, stay_s: 0.5, fov_deg: 60 },
-      ...{ position: between(share), look_at: focus, marker: between(share + 0.3) },
+      title,
+      caption,
+      stay_s: 0.5,
+      fov_deg: 60,
+      position: between(share),
+      look_at: focus,
+      marker: between(share + 0.3),
     });
     const stops = [
       stop('From afar', 'The whole city, as a bird sees it.\nGo nearer by the arrow.', 0.1),
@@ -78,7 +85,12 @@ describe('a tour', () => {
     expect(await opacity()).toBe('1');
     expect(await label.innerText()).toContain('Markets are held here');
     const box = (await label.boundingBox())!;
-    expect([box.x > 0, box.y > 0, box.x + box.width < 1280, box.y + box.height < 720]).not.toContain(false);
+    expect([
+      box.x > 0,
+      box.y > 0,
+      box.x + box.width < 1280,
+      box.y + box.height < 720,
+    ]).not.toContain(false);
     await keep_screenshot(page, 'hotspot-hover');
     // It stays while the pointer is on it, and Escape hides it for visitors who want to see behind it.
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2, { steps: 8 });
@@ -96,7 +108,9 @@ describe('a tour', () => {
     expect(await opacity()).toBe('1');
     expect(await spot.evaluate((el) => el === document.activeElement)).toBe(true);
     // Its name is the title; the caption describes it.
-    await page.getByRole('button', { name: 'The square', exact: true, description: /^Markets/ }).waitFor();
+    await page
+      .getByRole('button', { name: 'The square', exact: true, description: /^Markets/ })
+      .waitFor();
     await keep_screenshot(page, 'hotspot-keys');
     await page.keyboard.press('Enter');
     await page.getByText('2 of 2').waitFor();
@@ -142,9 +156,7 @@ describe('a tour', () => {
     await choice.selectOption('cameraAnim');
     const before = await pose_of(page);
     await page.getByRole('button', { name: 'Play the tour' }).click();
-    await expect
-      .poll(async () => distance(before, await pose_of(page)))
-      .toBeGreaterThan(0.5);
+    await expect.poll(async () => distance(before, await pose_of(page))).toBeGreaterThan(0.5);
     await page.getByRole('button', { name: 'Pause the tour' }).click();
     const paused = await pose_of(page);
     await settle(page);
@@ -157,15 +169,18 @@ describe('a tour', () => {
     await page.getByText('1 of 2').waitFor();
     await settle(page);
     await keep_screenshot(page, `tour-${name}`);
-    const outside = await page.evaluate(() =>
-      [...document.querySelectorAll('#tour, #toolbar, #scene-title')].filter((element) => {
-        const { left, right, top, bottom } = element.getBoundingClientRect();
-        return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
-      }).length,
+    const outside = await page.evaluate(
+      () =>
+        [...document.querySelectorAll('#tour, #toolbar, #scene-title')].filter((element) => {
+          const { left, right, top, bottom } = element.getBoundingClientRect();
+          return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
+        }).length,
     );
     expect(outside).toBe(0);
     const [tour, bar] = await page.evaluate(() =>
-      ['tour', 'toolbar'].map((id) => document.getElementById(id)!.getBoundingClientRect().toJSON() as DOMRect),
+      ['tour', 'toolbar'].map(
+        (id) => document.getElementById(id)!.getBoundingClientRect().toJSON() as DOMRect,
+      ),
     );
     const apart = tour!.right <= bar!.left || tour!.bottom <= bar!.top;
     expect(apart).toBe(true);
@@ -183,8 +198,19 @@ describe('a tour that waits at a stop with a long caption', () => {
     copyFileSync(scene, other);
     copyFileSync(path.join(folder, 'city.json'), path.join(folder, 'patient.json'));
     write_tours(path.join(folder, 'patient.json'), ({ focus, start_pose: { position } }) => {
-      const stop = (title: string, caption: string) => ({ title, caption, position, look_at: focus, stay_s: 60 });
-      return [{ title: 'Patience', stops: [stop('The tower', 'A long story. '.repeat(40)), stop('The gate', 'Closed.')] }];
+      const stop = (title: string, caption: string) => ({
+        title,
+        caption,
+        position,
+        look_at: focus,
+        stay_s: 60,
+      });
+      return [
+        {
+          title: 'Patience',
+          stops: [stop('The tower', 'A long story. '.repeat(40)), stop('The gate', 'Closed.')],
+        },
+      ];
     });
     patient = await start_server(other, ['--min-fps', '0']);
   });
@@ -368,7 +394,10 @@ describe('ways to move', () => {
 
   it('a flick of the pointer goes on for a moment, and not with reduced motion', async () => {
     for (const reducedMotion of ['no-preference', 'reduce'] as const) {
-      const { page } = await open(server.url, { viewport: { width: 640, height: 360 }, reducedMotion });
+      const { page } = await open(server.url, {
+        viewport: { width: 640, height: 360 },
+        reducedMotion,
+      });
       const lifted = await page.evaluate(async () => {
         const view = document.getElementById('view')!;
         const send = (type: string, clientX: number): void => {

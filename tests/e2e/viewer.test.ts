@@ -5,7 +5,14 @@ import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import type { StatsSnapshot } from '#client/stats/metrics';
-import { choose_full_size, insecure_host, keep_screenshot, new_page, open, windows } from './support/browser';
+import {
+  choose_full_size,
+  insecure_host,
+  keep_screenshot,
+  new_page,
+  open,
+  windows,
+} from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { web_dist } from './support/fake_server';
 import { psnr_db, settled_picture, thumbnail } from './support/pictures';
@@ -127,7 +134,10 @@ describe('trouble', () => {
     await page.evaluate(() => {
       document.body.dataset['visit'] = 'first';
       const { position, orientation } = window.catgs!.pose();
-      window.catgs!.setPose({ position: [position[0] + 0.5, position[1], position[2]], orientation });
+      window.catgs!.setPose({
+        position: [position[0] + 0.5, position[1], position[2]],
+        orientation,
+      });
     });
     await settle(page);
     const before = await pose_of(page);
@@ -170,8 +180,11 @@ describe('trouble', () => {
     expect(guarded.log()).not.toContain('a-long-and-secret-token');
   });
 
-  it('a certificate of one\'s own is enough for video under another name', async () => {
-    const [cert, key] = ['cert.pem', 'key.pem'].map((name) => path.join(folder, name)) as [string, string];
+  it("a certificate of one's own is enough for video under another name", async () => {
+    const [cert, key] = ['cert.pem', 'key.pem'].map((name) => path.join(folder, name)) as [
+      string,
+      string,
+    ];
     execFileSync(
       'openssl',
       [
@@ -189,7 +202,10 @@ describe('trouble', () => {
     });
     expect(page.url()).toMatch(/^https:/);
     await page.keyboard.press('KeyI');
-    await page.locator('#stats-panel').getByText(/libx264/).waitFor();
+    await page
+      .locator('#stats-panel')
+      .getByText(/libx264/)
+      .waitFor();
     expect(await page.locator('#notice').isHidden()).toBe(true);
     expect(errors).toEqual([]);
   });
@@ -226,7 +242,8 @@ describe('trouble', () => {
     expect((await stats_of(page)).frames_shown).toBe(frames_shown);
     await show(false);
     await settle(page);
-    const { x } = (await page.evaluate(() => window.catgs!.snapshot())).header.renderPose!.position!;
+    const { x } = (await page.evaluate(() => window.catgs!.snapshot())).header.renderPose!
+      .position!;
     expect(x).toBeCloseTo((await pose_of(page)).position[0], 3);
   });
 
@@ -238,7 +255,7 @@ describe('trouble', () => {
     page.on('console', (message) => said.push(message.text()));
     await page.goto(plain.url.replace('127.0.0.1', insecure_host));
     await page.getByText('The picture may be slower here').waitFor();
-    expect(said.join()).toContain('WebCodecs');
+    await expect.poll(() => said.join()).toContain('WebCodecs');
     await settle(page);
     await choose_full_size(page);
     const picture = await settled_picture(page);
@@ -252,7 +269,9 @@ describe('trouble', () => {
     ['the hardware', "configuration.hardwareAcceleration !== 'prefer-software'", 'prefer-software'],
     ['any', 'true', 'jpeg'],
   ])('%s video decoder that fails is replaced, and remembered', async (_which, fails, rung) => {
-    const faulty = await start_server(scene, ['--client-dir', client_with(`
+    const faulty = await start_server(scene, [
+      '--client-dir',
+      client_with(`
       self.VideoDecoder = class extends VideoDecoder {
         configure(configuration) {
           this.fails = ${fails};
@@ -262,11 +281,13 @@ describe('trouble', () => {
           if (this.fails) throw new DOMException('injected', 'EncodingError');
           super.decode(chunk);
         }
-      };`)]);
+      };`),
+    ]);
     const { page } = await new_page();
     const warnings: string[] = [];
     page.on('console', (message) => warnings.push(message.text()));
-    const decoder_failures = (): number => warnings.filter((text) => text.includes('video decoder failed')).length;
+    const decoder_failures = (): number =>
+      warnings.filter((text) => text.includes('video decoder failed')).length;
     await page.goto(faulty.url);
     await settle(page);
     expect(decoder_failures()).toBeGreaterThanOrEqual(2);
@@ -277,7 +298,10 @@ describe('trouble', () => {
     await settle(page);
     expect(decoder_failures()).toBe(0);
     await page.keyboard.press('KeyI');
-    await page.locator('#stats-panel').getByText(rung === 'jpeg' ? /jpeg/ : /libx264/).waitFor();
+    await page
+      .locator('#stats-panel')
+      .getByText(rung === 'jpeg' ? /jpeg/ : /libx264/)
+      .waitFor();
   });
 
   it('an unknown scene is said, and the ones there are', async () => {

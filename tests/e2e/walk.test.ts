@@ -24,8 +24,15 @@ beforeAll(async () => {
   writeFileSync(
     path.join(folder, 'city.json'),
     JSON.stringify({
-      ...{ up: [0, -1, 0], metres_per_unit: 1, start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] } },
-      tours: [{ title: 'The streets', stops: [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])] }],
+      up: [0, -1, 0],
+      metres_per_unit: 1,
+      start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] },
+      tours: [
+        {
+          title: 'The streets',
+          stops: [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])],
+        },
+      ],
     }),
   );
   catgs_render('floors', scene, path.join(folder, 'city.walk'), '--eye-height', String(eye_m));
@@ -36,7 +43,8 @@ beforeAll(async () => {
 async function walk(page: Page): Promise<Pose> {
   await page.locator('#button-plan').waitFor({ state: 'visible' });
   await page.locator('#view').focus();
-  for (let k = 0; k < 3 && (await page.locator('#mode-label').innerText()) !== 'Walk'; ++k) await page.keyboard.press('KeyM');
+  for (let k = 0; k < 3 && (await page.locator('#mode-label').innerText()) !== 'Walk'; ++k)
+    await page.keyboard.press('KeyM');
   await page.locator('#floor-ring').waitFor({ state: 'attached' });
   await expect.poll(async () => (await pose_of(page)).position[1]).toBeGreaterThan(-eye_m - 0.3);
   await settle(page);
@@ -152,7 +160,11 @@ describe('the floor plan', () => {
     expect(box.x).toBeGreaterThanOrEqual(0);
     expect(box.x + box.width).toBeLessThanOrEqual(width);
     // The middle of the picture stays free.
-    const covers = box.x < width / 2 && box.x + box.width > width / 2 && box.y < view_height / 2 && box.y + box.height > view_height / 2;
+    const covers =
+      box.x < width / 2 &&
+      box.x + box.width > width / 2 &&
+      box.y < view_height / 2 &&
+      box.y + box.height > view_height / 2;
     expect(covers).toBe(false);
     const bar = (await page.locator('#toolbar').boundingBox())!;
     expect(bar.x).toBeGreaterThanOrEqual(0);

@@ -59,11 +59,10 @@ LAYERS = {name: rank for rank, line in enumerate([
     "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour web_client/src/walk",
     "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film",
-    "web_client/src/ui", "web_client/src/media web_client/src/ground",
-    "web_client/src/ui/viewer",
-    "web_client/src/main",
+    "web_client/src/page", "web_client/src/author", "web_client/src/ui", "web_client/src/media web_client/src/walkable_area",
+    "web_client/src",
 ]) for name in line.split()}
-LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!wire/generated/)")
+LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!\w+/generated/)")
 
 
 INCLUDE_RULES = [
@@ -87,9 +86,9 @@ INCLUDE_RULES = [
 ]
 # TypeScript follows the same idea by module path.
 IMPORT_RULES = [
-    IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|/generated/",
+    IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|wire/generated/",
                 "src/wire alone speaks protobuf"),
-    IncludeRule(r"^web_client/src/ui/", r"^\.\./(transport/|worker/worker$|session/session$)",
+    IncludeRule(r"^web_client/src/(page|author|ui|media|walkable_area)/", r"^\.\./(transport/|worker/worker$|session/session$)",
                 "the page speaks to the worker through worker/client"),
 ]
 
@@ -130,8 +129,6 @@ MAX_IMPORTS = 20
 MORE_IMPORTS = {
     "render_core/scene/files/load_scene.cpp": 22,
     "server/server.cpp": 27,
-    "web_client/src/ui/guide.ts": 28,
-    "web_client/src/ui/viewer.ts": 32,
 }
 
 # Pages whose tables name constants of the sources, and tests.

@@ -61,13 +61,17 @@ class RuleFindings(unittest.TestCase):
     def test_layers_of_the_client(self):
         self.assertEqual(self.findings("web_client/src/ui/a.ts", "import { b } from './b';",
                                        "import type { Eye } from '../camera/eye';"), [])
-        self.assertEqual(self.findings("web_client/src/main.ts", "import { a } from './ui/viewer';"), [])
+        self.assertEqual(self.findings("web_client/src/main.ts", "import { a } from './viewer';",
+                                       "import { b } from './ui/b';"), [])
         for path, module in [("camera/a.ts", "../present/warp"), ("input/a.ts", "../tour/tour"),
-                             ("base/a.ts", "../text"), ("ui/a.ts", "./viewer"), ("ui/a.ts", "../main")]:
+                             ("base/a.ts", "../text"), ("page/a.ts", "../ui/b"), ("ui/a.ts", "../media/b"),
+                             ("ui/a.ts", "../viewer")]:
             self.expect_one("does not lie above", f"web_client/src/{path}", f"}} from '{module}';")
         self.expect_one("is not in LAYERS", "web_client/src/new/a.ts", "import { b } from '../base/b';")
         self.expect_one("is not in LAYERS", "web_client/src/ui/a.ts", "import { b } from '../new/b';")
         self.expect_one("through worker/client", "web_client/src/ui/a.ts", "import '../worker/worker';")
+        self.expect_one("imports 21 modules", "web_client/src/ui/a.ts",
+                        *[f"import './{number}';" for number in range(lint.MAX_IMPORTS + 1)])
 
     def test_length_marker_words_and_guards(self):
         self.expect_one("lines, the limit", "server/a.cpp", *["int x;"] * (lint.MAX_LINES + 1))

@@ -37,10 +37,19 @@ describe('a draft of a tour', () => {
   });
 
   it('knows the first picture that nobody has described', () => {
-    const medium = (src: string, kind: 'image' | 'video', alt: string): object => ({ src, kind, alt });
-    const with_media = (...media: object[]): Stop => ({ ...stop('s'), media: media as unknown as Stop['media'] });
+    const medium = (src: string, kind: 'image' | 'video', alt: string): object => ({
+      src,
+      kind,
+      alt,
+    });
+    const with_media = (...media: object[]): Stop => ({
+      ...stop('s'),
+      media: media as unknown as Stop['media'],
+    });
     const draft = new TourDraft();
-    draft.add(with_media(medium('roof.jpg', 'image', 'A roof'), medium('opening.mp4', 'video', '')));
+    draft.add(
+      with_media(medium('roof.jpg', 'image', 'A roof'), medium('opening.mp4', 'video', '')),
+    );
     expect(draft.undescribed).toBeUndefined();
     draft.add_tour();
     draft.add(stop('first'));
@@ -106,7 +115,13 @@ describe('a draft of a tour', () => {
       way: { duration_s: 1, repeats: false, at: () => stop('x').eye },
       starts_itself: false,
     };
-    const second: Tour = { title: 'second', ...untranslated, stops: [stop('s')], way: undefined, starts_itself: false };
+    const second: Tour = {
+      title: 'second',
+      ...untranslated,
+      stops: [stop('s')],
+      way: undefined,
+      starts_itself: false,
+    };
     const draft = new TourDraft();
     draft.load([film, { ...second, title: 'first', starts_itself: true }, second], nothing_said);
     expect(draft.tour).toMatchObject({ title: 'first', starts_itself: true });
@@ -128,17 +143,31 @@ describe('a draft of a tour', () => {
       near: 0.2,
       limits: { min: [-20, -20, -20] },
       focus: [0, 0, 0],
-      ...{ title: 'Hall', credits: 'Ada', mode: 'walk', background: '#ffffff' },
+      title: 'Hall',
+      credits: 'Ada',
+      mode: 'walk',
+      background: '#ffffff',
     });
     expect(draft.sidecar(scene)).not.toHaveProperty('licence');
     const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };
-    const sidecar = draft.sidecar({ ...scene, start_pose, limits_min: [0, 0, 0], limits_max: [0, 0, 0] });
+    const sidecar = draft.sidecar({
+      ...scene,
+      start_pose,
+      limits_min: [0, 0, 0],
+      limits_max: [0, 0, 0],
+    });
     expect(sidecar).not.toHaveProperty('limits');
     expect(sidecar).toMatchObject({ start_pose: { position: [7, 7, 7] } });
     const { tours } = JSON.parse(JSON.stringify(sidecar)) as { tours: unknown };
     const [tour] = read_tours(tours, [0, -1, 0], 1);
     expect(tour).toMatchObject({ title: 'Mine' });
-    expect(tour!.stops[0]).toMatchObject({ title: 'a', caption: 'about a', marker: [0, 0, 9], stay_s: 8, fly_s: 2 });
+    expect(tour!.stops[0]).toMatchObject({
+      title: 'a',
+      caption: 'about a',
+      marker: [0, 0, 9],
+      stay_s: 8,
+      fly_s: 2,
+    });
   });
 });
 
@@ -189,7 +218,9 @@ describe('saving to the server', () => {
       refused('this link does not let you save'),
     );
     expect(await save(answered(502, '<html>Bad gateway</html>'))).toEqual(refused('status 502'));
-    expect(await save(() => Promise.reject(new TypeError('failed')))).toEqual(refused('the server does not answer'));
+    expect(await save(() => Promise.reject(new TypeError('failed')))).toEqual(
+      refused('the server does not answer'),
+    );
     const fetched = vi.fn(answered(200, ''));
     expect(await save(fetched, ' '.repeat(2 ** 20 + 1))).toEqual(
       refused(expect.stringMatching(/too many/)),

@@ -1,5 +1,19 @@
 import { describe, expect, it } from 'vitest';
-import { axis_angle, cross, dot, forward, identity, length, multiply, normalize, right, rotate, sub, type Quat, type Vec3 } from '#client/base/vector';
+import {
+  axis_angle,
+  cross,
+  dot,
+  forward,
+  identity,
+  length,
+  multiply,
+  normalize,
+  right,
+  rotate,
+  sub,
+  type Quat,
+  type Vec3,
+} from '#client/base/vector';
 import { same_view } from '#client/camera/same_view';
 import { camera, expect_vec, gesture, hold, scene, view_of } from './cameras';
 
@@ -179,7 +193,10 @@ describe('any mode', () => {
 
   it('goes as fast as the scene is large, wherever visits begin', () => {
     const way = (start_z: number): number => {
-      const made = camera('fly', { scale: 4, start_pose: { position: [0, 0, start_z], orientation: identity } });
+      const made = camera('fly', {
+        scale: 4,
+        start_pose: { position: [0, 0, start_z], orientation: identity },
+      });
       hold(made, { forward: 1 }, 0.1);
       return made.pose.position[2] - start_z;
     };

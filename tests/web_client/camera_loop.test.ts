@@ -33,7 +33,14 @@ describe('the camera loop', () => {
     vi.stubGlobal('requestAnimationFrame', (draw: () => void) => refreshes.push(draw));
     camera = make_camera();
     const clock = { now_us: () => now_us };
-    loop = new CameraLoop(camera, () => axes, () => touched, new Inertia(), clock, (sample) => sent.push(sample));
+    loop = new CameraLoop(
+      camera,
+      () => axes,
+      () => touched,
+      new Inertia(),
+      clock,
+      (sample) => sent.push(sample),
+    );
     loop.enable();
   });
   afterEach(() => vi.unstubAllGlobals());

@@ -17,7 +17,10 @@ export const scene: SceneSetup = {
 };
 
 /** A camera that moves at once. */
-export function camera(mode: CameraMode = 'orbit', change: Partial<SceneSetup> = {}): CameraController {
+export function camera(
+  mode: CameraMode = 'orbit',
+  change: Partial<SceneSetup> = {},
+): CameraController {
   const made = new CameraController();
   made.smoothing_s = 0;
   made.load({ ...scene, ...change });
@@ -36,7 +39,11 @@ export function gesture(made: CameraController, what: Gesture): void {
 
 export const view_of = (made: CameraController): Vec3 => rotate(made.pose.orientation, forward);
 
-export function expect_vec(actual: readonly number[], expected: readonly number[], digits = 5): void {
+export function expect_vec(
+  actual: readonly number[],
+  expected: readonly number[],
+  digits = 5,
+): void {
   expect(actual).toHaveLength(expected.length);
   actual.forEach((v, i) => expect(v).toBeCloseTo(expected[i]!, digits));
 }

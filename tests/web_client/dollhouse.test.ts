@@ -2,8 +2,9 @@ import { describe, expect, it } from 'vitest';
 import { Signal } from '#client/base/signal';
 import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
 import type { CameraMode } from '#client/camera/mode';
-import { Dollhouse } from '#client/ground/dollhouse';
-import type { Navigation } from '#client/ui/navigation';
+import { Dollhouse } from '#client/walkable_area/dollhouse';
+import { GestureRouter } from '#client/page/gestures';
+import type { Navigation } from '#client/page/navigation';
 import { ceiling_cut, dollhouse_eye, house_around } from '#client/walk/dollhouse';
 import { to_world, type Block, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
 import type { WorkerClient } from '#client/worker/client';
@@ -14,7 +15,11 @@ import { flat_tiles } from './walk_maps';
 function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkMap {
   return {
     origin: [5, 1, -2],
-    axes: [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+    axes: [
+      [1, 0, 0],
+      [0, 0, 1],
+      [0, -1, 0],
+    ],
     cell: 0.1,
     step: 3,
     radius: 2,
@@ -24,15 +29,30 @@ function map_of(width: number, depth: number, storeys: readonly Storey[]): WalkM
     tiles: flat_tiles(width, depth, 10, () => true),
   };
 }
-const all_of = ({ tiles }: WalkMap): Block => ({ west: 0, south: 0, east: tiles.width, north: tiles.depth });
+const all_of = ({ tiles }: WalkMap): Block => ({
+  west: 0,
+  south: 0,
+  east: tiles.width,
+  north: tiles.depth,
+});
 const one: Storey = { low: 0, level: 10, area: 100 };
 
 describe('dollhouse', () => {
   it('is for houses, around their ground', async () => {
-    expect(await house_around(map_of(80, 70, [one]))).toEqual({ west: 0, south: 0, east: 80, north: 70 });
+    expect(await house_around(map_of(80, 70, [one]))).toEqual({
+      west: 0,
+      south: 0,
+      east: 80,
+      north: 70,
+    });
     expect(await house_around(map_of(1000, 70, [one]))).toBeUndefined();
-    expect(await house_around(map_of(1000, 70, [one, { low: 30, level: 40, area: 50 }]))).toBeDefined();
-    const yard = { ...map_of(200, 80, [one]), tiles: flat_tiles(200, 80, 10, (x, y) => x > 3 && x < 150 && y >= 66) };
+    expect(
+      await house_around(map_of(1000, 70, [one, { low: 30, level: 40, area: 50 }])),
+    ).toBeDefined();
+    const yard = {
+      ...map_of(200, 80, [one]),
+      tiles: flat_tiles(200, 80, 10, (x, y) => x > 3 && x < 150 && y >= 66),
+    };
     expect(await house_around(yard)).toEqual({ west: 4, south: 66, east: 150, north: 80 });
   });
 
@@ -49,7 +69,12 @@ describe('dollhouse', () => {
     const fov_y_rad = 1;
     const { eye, focus } = dollhouse_eye(map, all_of(map), 0, fov_y_rad, aspect);
     const tan = Math.tan(fov_y_rad / 2);
-    for (const [east, north] of [[0, 0], [80, 0], [0, 40], [80, 40]] as const) {
+    for (const [east, north] of [
+      [0, 0],
+      [80, 0],
+      [0, 40],
+      [80, 40],
+    ] as const) {
       const corner = to_world(map, { east, north, height: one.level });
       const [x, y, z] = rotate(conjugate(eye.orientation), sub(corner, eye.position));
       expect(z).toBeGreaterThan(0);
@@ -78,15 +103,20 @@ describe('a visitor of the dollhouse', () => {
       reach: 5,
       loop: { wake: () => undefined },
       taken_over: new Signal(),
-      tapped: undefined as Navigation['tapped'],
+      gestures: new GestureRouter(),
       set_mode: (mode: CameraMode) => made.set_mode(mode),
       // Straight down onto the middle of the floor.
-      ray_at: () => ({ origin: to_world(map, { east: 40, north: 35, height: 30 }), direction: [0, 1, 0] as const }),
+      ray_at: () => ({
+        origin: to_world(map, { east: 40, north: 35, height: 30 }),
+        direction: [0, 1, 0] as const,
+      }),
     };
     const house = new Dollhouse(
       {
         view: { clientWidth: 160, clientHeight: 90 } as HTMLElement,
-        worker: { post: ({ plane }: { plane: unknown }) => clips.push(plane) } as unknown as WorkerClient,
+        worker: {
+          post: ({ plane }: { plane: unknown }) => clips.push(plane),
+        } as unknown as WorkerClient,
         navigation: navigation as unknown as Navigation,
         reduced_motion: true,
         go_to: (stand) => chosen.push(stand),
@@ -123,7 +153,7 @@ describe('a visitor of the dollhouse', () => {
     expect_vec(made.pose.orientation, before.orientation);
     expect(made.mode).toBe('fly');
     expect(clips.at(-1)).toBeUndefined();
-    expect(navigation.tapped).toBeUndefined();
+    expect(navigation.gestures.has('dollhouse')).toBe(false);
     expect(shown).toEqual([true, false]);
     house.leave();
     expect(clips).toHaveLength(2);
@@ -140,11 +170,21 @@ describe('a visitor of the dollhouse', () => {
     expect(made.within([99, 0, 0])).toEqual([20, 0, 0]);
   });
 
+  it('keeps the mode that they chose there', () => {
+    const { house, made } = enter();
+    made.set_mode('walk');
+    house.leave();
+    expect(made.mode).toBe('walk');
+  });
+
   it('points at the floor, also after something else heard the taps', () => {
-    const { house, navigation, chosen } = enter();
-    navigation.tapped = undefined;
-    house.show(0);
-    navigation.tapped!(0.5, 0.5);
+    const { navigation, chosen } = enter();
+    navigation.gestures.set('measure', () => true);
+    navigation.gestures.route({ x: 0.5, y: 0.5, how: 'click' });
+    expect(chosen).toHaveLength(0);
+    navigation.gestures.remove('measure');
+    for (const how of ['click', 'double tap'] as const)
+      navigation.gestures.route({ x: 0.5, y: 0.5, how });
     expect(chosen).toHaveLength(1);
     expect(chosen[0]).toMatchObject({ east: 40, north: 35 });
   });

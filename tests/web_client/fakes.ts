@@ -2,7 +2,12 @@
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
 import type { Clock, Timers } from '#client/base/clock';
 import type { OpenSocket, SocketEvents } from '#client/transport/socket';
-import { ClientMessageSchema, FrameHeaderSchema, ServerMessageSchema, type ClientMessage } from '#client/wire/wire';
+import {
+  ClientMessageSchema,
+  FrameHeaderSchema,
+  ServerMessageSchema,
+  type ClientMessage,
+} from '#client/wire/wire';
 
 export function fake_storage(): Storage {
   const values = new Map<string, string>();

@@ -62,7 +62,9 @@ describe('keys', () => {
 describe('mouse', () => {
   it('looks with the primary button, in fractions of the height', () => {
     const pointers = held(sample({}));
-    expect(pointers.move(sample({ x: 140, y: 80 }), height_px)).toEqual([{ kind: 'look', dx: 0.1, dy: -0.05 }]);
+    expect(pointers.move(sample({ x: 140, y: 80 }), height_px)).toEqual([
+      { kind: 'look', dx: 0.1, dy: -0.05 },
+    ]);
   });
 
   it.each([
@@ -71,7 +73,9 @@ describe('mouse', () => {
     ['shift', { shift: true }],
   ])('pans with %s', (_name, change) => {
     const pointers = held(sample(change));
-    expect(pointers.move(sample({ ...change, x: 120 }), height_px)).toEqual([{ kind: 'pan', dx: 0.05, dy: 0 }]);
+    expect(pointers.move(sample({ ...change, x: 120 }), height_px)).toEqual([
+      { kind: 'pan', dx: 0.05, dy: 0 },
+    ]);
   });
 
   it('does nothing while no button is held', () => {
@@ -118,10 +122,12 @@ describe('touch', () => {
     expect(dolly?.steps).toBeCloseTo(1, 9);
   });
 
-  it('ignores a third finger, and goes on looking when one of two is lifted', () => {
+  it('ignores a third finger, and keeps looking when one of two is lifted', () => {
     const pointers = held(finger(1, 100, 100), finger(2, 200, 100), finger(3, 300, 100));
     expect(pointers.move(finger(3, 310, 100), height_px)).toEqual([]);
     pointers.up(1);
-    expect(pointers.move(finger(2, 240, 100), height_px)).toEqual([{ kind: 'look', dx: 0.1, dy: 0 }]);
+    expect(pointers.move(finger(2, 240, 100), height_px)).toEqual([
+      { kind: 'look', dx: 0.1, dy: 0 },
+    ]);
   });
 });

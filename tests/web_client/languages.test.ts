@@ -3,13 +3,15 @@ import { readdirSync, readFileSync } from 'node:fs';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
-import { beforeAll, describe, expect, it } from 'vitest';
-import { text as english } from '#client/text/en';
+import { describe, expect, it } from 'vitest';
+import type { catalogue } from '#client/text/generated/en';
 import { choose_language, languages } from '#client/text/language';
+import { messages, type Catalogue, type Translation } from '#client/text/messages';
 import { decimals, duration, factor, number } from '#client/text/number';
-import { load_texts, type Texts } from '#client/text/text';
+import { load_texts } from '#client/text/text';
 
 const source = fileURLToPath(new URL('../../web_client/src', import.meta.url));
+const locales = path.join(source, '../locales');
 
 describe('the language of the page', () => {
   const of = (preferred: readonly string[], query = ''): string =>
@@ -33,68 +35,130 @@ describe('the language of the page', () => {
 
   it('comes with the tag for numbers, and with what the visitor reads best', () => {
     expect(choose_language('http://host/', ['de-CH', 'en'])).toEqual({
-      ...{ language: 'de', locale: 'de-CH', readers: ['de-CH', 'de'] },
+      language: 'de',
+      locale: 'de-CH',
+      readers: ['de-CH', 'de'],
     });
     expect(choose_language('http://host/?lang=ar', ['nl']).locale).toBe('ar');
     // The page does not speak Dutch, but a tour may.
-    expect(choose_language('http://host/', ['nl', 'ko'])).toMatchObject({ language: 'ko', readers: ['nl', 'ko'] });
-    expect(choose_language('http://host/', ['nl'])).toMatchObject({ language: 'en', locale: 'en', readers: ['nl', 'en'] });
+    expect(choose_language('http://host/', ['nl', 'ko'])).toMatchObject({
+      language: 'ko',
+      readers: ['nl', 'ko'],
+    });
+    expect(choose_language('http://host/', ['nl'])).toMatchObject({
+      language: 'en',
+      locale: 'en',
+      readers: ['nl', 'en'],
+    });
   });
 });
 
-/** Every text with its key, and functions called with values that can be found again. */
-function said(texts: object, prefix = ''): Map<string, string> {
-  const found = new Map<string, string>();
-  for (const [name, value] of Object.entries(texts) as [string, unknown][]) {
+/** Catalogues beside the languages. */
+const english_only = ['operator', 'console'] as const;
+
+const read_catalogue = (name: string): Catalogue =>
+  JSON.parse(readFileSync(path.join(locales, `${name}.json`), 'utf8')) as Catalogue;
+
+/** Every text with its key, as its forms: those of a plural by their category, else one without a category. */
+function forms_of(
+  catalogue: Catalogue,
+  prefix = '',
+): Map<string, Readonly<Record<string, string>>> {
+  const found = new Map<string, Readonly<Record<string, string>>>();
+  for (const [name, node] of Object.entries(catalogue)) {
     const key = prefix + name;
-    if (typeof value === 'string') found.set(key, value);
-    else if (typeof value === 'function') {
-      const make = value as (...values: unknown[]) => string;
-      found.set(key, make('‹0›', '‹1›', '‹2›'));
-      for (const count of [0, 1, 2, 3, 11, 100]) make('‹0›', count, '‹2›');
-    } else for (const [inner, words] of said(value as object, `${key}.`)) found.set(inner, words);
+    if (typeof node === 'string') found.set(key, { '': node });
+    else if (typeof node['other'] === 'string')
+      found.set(key, node as Readonly<Record<string, string>>);
+    else for (const [inner, forms] of forms_of(node, `${key}.`)) found.set(inner, forms);
   }
   return found;
 }
 
-const placeholders = (words: string): string[] => (words.match(/‹\d›/g) ?? []).sort();
+const values_in = (words: string): string[] => words.match(/\{\w+\}/g) ?? [];
+const all_values = (forms: Readonly<Record<string, string>>): string[] =>
+  [...new Set(Object.values(forms).flatMap(values_in))].sort();
 
-describe.each(languages.filter((language) => language !== 'en'))('%s', (language) => {
-  let texts: Map<string, string>;
-  const originals = said(english);
+it('each language has a catalogue, and each catalogue a language', () => {
+  const files = readdirSync(locales).sort();
+  expect(files).toEqual([...languages, ...english_only].map((name) => `${name}.json`).sort());
+});
 
-  beforeAll(async () => {
-    texts = said(await load_texts(language));
-  });
+describe.each([...languages, ...english_only])('the catalogue %s', (name) => {
+  const is_english = english_only.some((other) => other === name);
+  const language = is_english ? 'en' : name;
+  const original = forms_of(read_catalogue(is_english ? name : 'en'));
+  const translated = forms_of(read_catalogue(name));
 
-  it('says all that English says, with the same values in it', () => {
-    expect([...texts.keys()]).toEqual([...originals.keys()]);
-    for (const [key, words] of texts) {
-      expect(words.trim(), key).not.toBe('');
-      // Where one or none is meant, a language may write a word and leave the number out.
-      if (!key.endsWith('you_lead') && !key.endsWith('tour.stops')) {
-        expect(new Set(placeholders(words)), key).toEqual(new Set(placeholders(originals.get(key)!)));
+  it('has the texts of English', () => {
+    expect([...translated.keys()]).toEqual([...original.keys()]);
+    for (const [key, forms] of translated) {
+      expect('other' in forms, key).toBe('other' in original.get(key)!);
+      for (const words of Object.values(forms)) {
+        expect(words.trim(), key).not.toBe('');
+        expect(/^\s/.test(words), key).toBe(/^\s/.test(Object.values(original.get(key)!)[0]!));
       }
-      expect(/^\s/.test(words), key).toBe(/^\s/.test(originals.get(key)!));
     }
   });
 
-  it('is not English', () => {
-    const same = [...texts].filter(([key, words]) => words === originals.get(key) && / \w+ /.test(words));
-    expect(same).toEqual([]);
+  it('has the values of English in them', () => {
+    for (const [key, forms] of translated)
+      expect(all_values(forms), key).toEqual(all_values(original.get(key)!));
   });
 
-  // The page waits for this file before it starts, so the file must not wait for a part of the page.
-  it('needs nothing else of the page', () => {
-    const written = readFileSync(path.join(source, 'text', `${language}.ts`), 'utf8');
-    expect(written.match(/^import .*/gm)).toEqual(["import type { Texts } from './text';"]);
+  it('has a plural form for every number, and no other', () => {
+    const rules = new Intl.PluralRules(language);
+    const { pluralCategories } = rules.resolvedOptions();
+    for (const [key, forms] of translated) {
+      if (!('other' in forms)) continue;
+      for (let n = 0; n <= 200; ++n)
+        expect(forms[`=${n}`] ?? forms[rules.select(n)], `${key}: ${n}`).toBeDefined();
+      const categories = Object.keys(forms).filter((form) => !/^=\d+$/.test(form));
+      expect(pluralCategories, key).toEqual(expect.arrayContaining(categories));
+    }
+  });
+
+  it.skipIf(language === 'en')('is not English', () => {
+    const same = [...translated].filter(([key, forms]) => {
+      const english = Object.values(original.get(key)!);
+      return Object.values(forms).some((words) => english.includes(words) && / \w+ /.test(words));
+    });
+    expect(same).toEqual([]);
   });
 });
 
-it('knows the forms of Arabic plurals', async () => {
-  const { tour } = await load_texts('ar');
-  const forms = [1, 2, 3, 11, 100].map((count) => tour.stops(count, String(count)));
-  expect(forms).toEqual(['محطة واحدة', 'محطتان', '3 محطات', '11 محطة', '100 محطة']);
+describe('messages', () => {
+  it('have the values, with numbers as the locale writes them', () => {
+    const { place, plain } = messages(
+      { place: '{n} of {count}', plain: 'Stops' } as const,
+      'en',
+      'de',
+    );
+    expect([place({ n: 'one', count: 12345 }), plain]).toEqual(['one of 12.345', 'Stops']);
+  });
+
+  it('have the plural form of the count', async () => {
+    const { tour } = await load_texts('ar', 'ar-u-nu-latn');
+    const forms = [1, 2, 3, 11, 100].map((count) => tour.stops({ count }));
+    expect(forms).toEqual(['محطة واحدة', 'محطتان', '3 محطات', '11 محطة', '100 محطة']);
+    const { shared_tour } = await load_texts('en', 'en');
+    expect([0, 1, 2].map((count) => shared_tour.you_present({ count }))).toEqual([
+      'You are presenting. Nobody has joined yet.',
+      'You are presenting to one participant.',
+      'You are presenting to 2 participants.',
+    ]);
+  });
+
+  it('are typed: the compiler knows each text and its values', async () => {
+    const { tour } = await load_texts('en', 'en');
+    // @ts-expect-error: there is no such text
+    expect(tour.swim).toBeUndefined();
+    // @ts-expect-error: `count` is missing
+    expect(tour.position({ n: 1 })).toBe('1 of ');
+    // @ts-expect-error: `walk` is missing
+    const lacking: Translation<typeof catalogue>['modes'] = { orbit: '', fly: '' };
+    expect(Object.keys(lacking)).toHaveLength(2);
+  });
 });
 
 it('writes numbers and times', () => {
@@ -102,7 +166,12 @@ it('writes numbers and times', () => {
   expect(decimals(2, 1)).toBe('2.0');
   expect(factor(1.68179)).toBe('1.7×');
   expect([0.4, 1, 45, 89.4, 90, 600].map(duration)).toEqual([
-    'a moment', '1 second', '45 seconds', '89 seconds', '2 minutes', '10 minutes',
+    'a moment',
+    '1 second',
+    '45 seconds',
+    '89 seconds',
+    '2 minutes',
+    '10 minutes',
   ]);
 });
 
@@ -118,25 +187,46 @@ describe('texts for people', () => {
     if (ts.isImportDeclaration(parent) || ts.isLiteralTypeNode(parent)) return true;
     for (let at: ts.Node = parent; !ts.isSourceFile(at); at = at.parent) {
       if (ts.isStatement(at)) return false;
-      const called = ts.isCallExpression(at) || ts.isNewExpression(at) ? at.expression.getText() : '';
-      if (/^console\.|^require$|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(called)) return true;
+      const called =
+        ts.isCallExpression(at) || ts.isNewExpression(at) ? at.expression.getText() : '';
+      if (
+        /^console\.|^require$|Error$|querySelector|matchMedia|\.matches$|message\.startsWith$|\.undecodable$/.test(
+          called,
+        )
+      )
+        return true;
     }
     return false;
   }
 
   /** Two words, or one that begins a sentence. */
-  const is_prose = (words: string): boolean => /[a-z]{2,} [a-z]{2,}/i.test(words) || /^[A-Z][a-z]{2,}( |$)/.test(words);
+  const is_prose = (words: string): boolean =>
+    /[a-z]{2,} [a-z]{2,}/i.test(words) || /^[A-Z][a-z]{2,}( |$)/.test(words);
 
   // Shaders, markup and names that browsers give.
-  const not_prose = /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad)[A-Z]?[a-z]*$|^(OffscreenCanvas|WebSocket|Worker|Notification|Bearer |noopener noreferrer)$/;
+  const not_prose =
+    /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad)[A-Z]?[a-z]*$|^(OffscreenCanvas|WebSocket|Worker|Notification|Bearer |noopener noreferrer)$/;
 
   it('are in the files of the languages alone', () => {
     const loose: string[] = [];
     for (const file of files) {
-      const tree = ts.createSourceFile(file, readFileSync(file, 'utf8'), ts.ScriptTarget.ES2022, true);
+      const tree = ts.createSourceFile(
+        file,
+        readFileSync(file, 'utf8'),
+        ts.ScriptTarget.ES2022,
+        true,
+      );
       const look = (node: ts.Node): void => {
-        const is_literal = ts.isStringLiteralLike(node) || ts.isTemplateHead(node) || ts.isTemplateMiddleOrTemplateTail(node);
-        if (is_literal && is_prose(node.text) && !not_prose.test(node.text) && !is_for_machines(node)) {
+        const is_literal =
+          ts.isStringLiteralLike(node) ||
+          ts.isTemplateHead(node) ||
+          ts.isTemplateMiddleOrTemplateTail(node);
+        if (
+          is_literal &&
+          is_prose(node.text) &&
+          !not_prose.test(node.text) &&
+          !is_for_machines(node)
+        ) {
           const { line } = tree.getLineAndCharacterOfPosition(node.getStart());
           loose.push(`${path.relative(source, file)}:${line + 1}: ${node.text.slice(0, 60)}`);
         }
@@ -147,14 +237,4 @@ describe('texts for people', () => {
     expect(files.length).toBeGreaterThan(60);
     expect(loose).toEqual([]);
   }, 60_000); // it parses the whole client
-});
-
-// The compiler refuses a language that lacks a text, or has one too many.
-it('is typed against English', () => {
-  const lacking = { ...english, modes: { orbit: '', fly: '' } };
-  // @ts-expect-error: `walk` is missing
-  const wrong: Texts = lacking;
-  // @ts-expect-error: there is no `swim`
-  const too_much: Texts['modes'] = { orbit: '', fly: '', walk: '', swim: '' };
-  expect([wrong, too_much]).toHaveLength(2);
 });

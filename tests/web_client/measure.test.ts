@@ -4,7 +4,12 @@ import { normalize, type Vec3 } from '#client/base/vector';
 import { area_of, length_of, rise_of, type Mark } from '#client/measure/measurement';
 import { usual_system, written } from '#client/measure/units';
 
-const mark = (point: Vec3, along = 0, across = 0, direction: Vec3 = [0, 0, 1]): Mark => ({ point, direction, along, across });
+const mark = (point: Vec3, along = 0, across = 0, direction: Vec3 = [0, 0, 1]): Mark => ({
+  point,
+  direction,
+  along,
+  across,
+});
 
 describe('measuring', () => {
   it('adds up lengths along the marks', () => {
@@ -21,10 +26,17 @@ describe('measuring', () => {
   });
 
   it('tells the area of a polygon in any plane, however it is turned', () => {
-    const square: Vec3[] = [[0, 0, 0], [2, 0, 0], [2, 0, 3], [0, 0, 3]];
+    const square: Vec3[] = [
+      [0, 0, 0],
+      [2, 0, 0],
+      [2, 0, 3],
+      [0, 0, 3],
+    ];
     expect(area_of(square.map((point) => mark(point))).value).toBeCloseTo(6);
     expect(area_of([...square].reverse().map((point) => mark(point))).value).toBeCloseTo(6);
-    const tilted = square.map(([x, , z]): Vec3 => [x * Math.SQRT1_2 + 100, x * Math.SQRT1_2, z - 50]);
+    const tilted = square.map(
+      ([x, , z]): Vec3 => [x * Math.SQRT1_2 + 100, x * Math.SQRT1_2, z - 50],
+    );
     expect(area_of(tilted.map((point) => mark(point))).value).toBeCloseTo(6);
   });
 
@@ -39,7 +51,12 @@ describe('measuring', () => {
 
   it('states an error that holds for marks that are off by as much', () => {
     const random = lcg(7);
-    const places: Vec3[] = [[0, 0, 4], [3, 0, 5], [3, 2, 6], [0, 2, 5]];
+    const places: Vec3[] = [
+      [0, 0, 4],
+      [3, 0, 5],
+      [3, 2, 6],
+      [0, 2, 5],
+    ];
     const marks = places.map((point) => mark(point, 0.02, 0.01, normalize(point, [0, 0, 1])));
     for (const measure of [length_of, area_of]) {
       const { value, error } = measure(marks);
@@ -64,15 +81,24 @@ describe('units', () => {
     expect(written({ value: -6.841, error: 0.1 }, metric)).toBe('−3.421\u00a0m ± 0.050\u00a0m');
     expect(written({ value: 5000, error: 40 }, metric)).toBe('2.500\u00a0km ± 0.020\u00a0km');
     expect(written({ value: 8, error: 1 }, metric, 2)).toBe('2.00\u00a0m² ± 0.25\u00a0m²');
-    expect(written({ value: 2, error: 0.1 }, { metres_per_unit: 0.3048, system: 'imperial' })).toBe('2.00\u00a0ft ± 0.10\u00a0ft');
+    expect(written({ value: 2, error: 0.1 }, { metres_per_unit: 0.3048, system: 'imperial' })).toBe(
+      '2.00\u00a0ft ± 0.10\u00a0ft',
+    );
   });
 
   it('are those of the scene where nobody has said its scale', () => {
-    expect(written({ value: 1.25, error: 0.1 }, { metres_per_unit: undefined, system: 'metric' })).toBe('1.25 ± 0.10');
+    expect(
+      written({ value: 1.25, error: 0.1 }, { metres_per_unit: undefined, system: 'metric' }),
+    ).toBe('1.25 ± 0.10');
   });
 
   it('are imperial where people use them', () => {
-    expect(['en-US', 'en-GB', 'de', 'my-MM'].map(usual_system)).toEqual(['imperial', 'metric', 'metric', 'imperial']);
+    expect(['en-US', 'en-GB', 'de', 'my-MM'].map(usual_system)).toEqual([
+      'imperial',
+      'metric',
+      'metric',
+      'imperial',
+    ]);
   });
 });
 
@@ -87,10 +113,12 @@ function lcg(seed: number): () => number {
 
 /** The mark's point, off by a Gaussian error along its ray and across it. */
 function off({ point, direction, along, across }: Mark, random: () => number): Vec3 {
-  const normal = (): number => Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
+  const normal = (): number =>
+    Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
   const noise: Vec3 = [normal() * across, normal() * across, normal() * across];
   const by = noise[0] * direction[0] + noise[1] * direction[1] + noise[2] * direction[2];
   const depth = normal() * along;
-  return [0, 1, 2].map((i) => point[i]! + noise[i]! + direction[i]! * (depth - by)) as unknown as Vec3;
+  return [0, 1, 2].map(
+    (i) => point[i]! + noise[i]! + direction[i]! * (depth - by),
+  ) as unknown as Vec3;
 }
-

@@ -2,18 +2,27 @@
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '#client/base/vector';
-import { free_name } from '#client/media/shelf';
+import { free_name } from '#client/media/media_folder';
 import { Sounds, type Playable } from '#client/media/sounds';
 import * as limits from '#client/tour/limits';
 import { accepted, kind_of, media_kinds } from '#client/tour/media';
-import { has_media, read_tours, tours_for, write_tours, type Stop, type Tour } from '#client/tour/tour';
+import {
+  has_media,
+  read_tours,
+  tours_for,
+  write_tours,
+  type Stop,
+  type Tour,
+} from '#client/tour/tour';
 import { fake_storage } from './fakes';
 
 const up: Vec3 = [0, -1, 0];
 const place = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
-const read = (stop: object, tour: object = {}): Tour => read_tours([{ ...tour, stops: [{ ...place, ...stop }] }], up, 1)[0]!;
+const read = (stop: object, tour: object = {}): Tour =>
+  read_tours([{ ...tour, stops: [{ ...place, ...stop }] }], up, 1)[0]!;
 const stop_of = (stop: object): Stop => read(stop).stops[0]!;
-const source = (file: string): string => readFileSync(new URL(`../../${file}`, import.meta.url), 'utf8');
+const source = (file: string): string =>
+  readFileSync(new URL(`../../${file}`, import.meta.url), 'utf8');
 
 describe('media of a sidecar', () => {
   const media = [
@@ -23,24 +32,35 @@ describe('media of a sidecar', () => {
   ];
 
   it('are read, and written as they were', () => {
-    const tour = read({ media, narration: { src: 'a.mp3', captions: 'a.vtt' } }, { sound: { src: 'sea.ogg', volume: 0.2 } });
+    const tour = read(
+      { media, narration: { src: 'a.mp3', captions: 'a.vtt' } },
+      { sound: { src: 'sea.ogg', volume: 0.2 } },
+    );
     expect(tour.sound).toEqual({ src: 'sea.ogg', volume: 0.2 });
     const [stop] = tour.stops;
     expect(stop!.narration).toEqual({ src: 'a.mp3', captions: 'a.vtt' });
     expect(stop!.media!.map(({ kind, alt, captions }) => [kind, alt, captions])).toEqual([
-      ['image', 'A door', ''], ['video', '', 'film.vtt'], ['audio', '', ''],
+      ['image', 'A door', ''],
+      ['video', '', 'film.vtt'],
+      ['audio', '', ''],
     ]);
-    const [written] = write_tours([tour]) as { sound: object; stops: { media: object; narration: object }[] }[];
+    const [written] = write_tours([tour]) as {
+      sound: object;
+      stops: { media: object; narration: object }[];
+    }[];
     expect(written!.stops[0]!.media).toEqual(media);
     expect(written!.stops[0]!.narration).toEqual({ src: 'a.mp3', captions: 'a.vtt' });
     expect(written!.sound).toEqual({ src: 'sea.ogg', volume: 0.2 });
     expect(has_media(tour)).toBe(true);
     expect(has_media(read({}))).toBe(false);
-    expect(write_tours([read({})])).toEqual([{ title: '', stops: [expect.not.objectContaining({ media: expect.anything() as unknown })] }]);
+    expect(write_tours([read({})])).toEqual([
+      { title: '', stops: [expect.not.objectContaining({ media: expect.anything() as unknown })] },
+    ]);
   });
 
   it('describe pictures in the language of the visitor', () => {
-    const alt_for = (...readers: string[]): unknown => tours_for([read({ media })], readers)[0]!.stops[0]!.media![0];
+    const alt_for = (...readers: string[]): unknown =>
+      tours_for([read({ media })], readers)[0]!.stops[0]!.media![0];
     expect(alt_for('de-CH')).toMatchObject({ alt: 'Eine Tür', language: 'de' });
     expect(alt_for('fr')).toMatchObject({ alt: 'A door', language: '' });
   });
@@ -49,16 +69,22 @@ describe('media of a sidecar', () => {
     [{ media: {} }, 'tours[0].stops[0].media: is not a list'],
     [{ media: [{ alt: 'x' }] }, "media[0]: 'src' is missing"],
     [{ media: [{ src: 'a.jpg' }] }, "media[0]: 'alt' is missing"],
-    [{ media: [{ src: '../a.jpg', alt: 'x' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'a/b.jpg', alt: 'x' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'http://media.example/a.jpg', alt: 'x' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'javascript:alert(1)//a.mp4' }] }, 'media[0].src: is no name of a file'],
-    [{ media: [{ src: 'a.svg', alt: 'x' }] }, 'media[0].src: is no image, video or audio'],
-    [{ media: [{ src: 'a.mp4', type: 'page' }] }, 'media[0].type: is no image, video or audio'],
-    [{ media: [{ src: 'a.mp4', captions: 'a.html' }] }, 'captions: is no name of a .vtt file'],
-    [{ media: [{ src: 'a.mp4', captions: 'https://x.example/a.vtt' }] }, 'captions: is no name of a .vtt file'],
+    [{ media: [{ src: '../a.jpg', alt: 'x' }] }, 'media[0].src: is not the name of a file'],
+    [{ media: [{ src: 'a/b.jpg', alt: 'x' }] }, 'media[0].src: is not the name of a file'],
+    [
+      { media: [{ src: 'http://media.example/a.jpg', alt: 'x' }] },
+      'media[0].src: is not the name of a file',
+    ],
+    [{ media: [{ src: 'javascript:alert(1)//a.mp4' }] }, 'media[0].src: is not the name of a file'],
+    [{ media: [{ src: 'a.svg', alt: 'x' }] }, 'media[0].src: is not an image, video or audio'],
+    [{ media: [{ src: 'a.mp4', type: 'page' }] }, 'media[0].type: is not an image, video or audio'],
+    [{ media: [{ src: 'a.mp4', captions: 'a.html' }] }, 'captions: is not the name of a .vtt file'],
+    [
+      { media: [{ src: 'a.mp4', captions: 'https://x.example/a.vtt' }] },
+      'captions: is not the name of a .vtt file',
+    ],
     [{ media: Array.from({ length: 9 }, () => ({ src: 'a.mp3' })) }, 'has 9 entries, at most 8'],
-    [{ narration: { src: 'a.mp4' } }, 'narration.src: is no sound'],
+    [{ narration: { src: 'a.mp4' } }, 'narration.src: is not a sound'],
   ])('are refused by the field that is wrong: %j', (stop, complaint) => {
     expect(() => stop_of(stop)).toThrow(complaint);
   });
@@ -66,10 +92,23 @@ describe('media of a sidecar', () => {
   it('have the limits and the formats of the server', () => {
     const types = source('render_core/scene/files/media_name.cpp');
     const known = [...types.matchAll(/\{"(\w+)", &\w+\}/g)].map(([, extension]) => `.${extension}`);
-    expect(accepted([...media_kinds, 'captions']).split(',').sort()).toEqual(known.sort());
-    expect(source('server/media/media_type.h')).toContain(`max_media_bytes = ${limits.max_media_bytes >> 20} << 20`);
-    expect(source('render_core/scene/files/tour_check.cpp')).toContain(`max_media = ${limits.max_media};`);
-    expect([kind_of('a.JPG'), kind_of('a.jpg?x=.mp4'), kind_of('a.svg'), kind_of('mp4')]).toEqual(['image', 'image', undefined, undefined]);
+    expect(
+      accepted([...media_kinds, 'captions'])
+        .split(',')
+        .sort(),
+    ).toEqual(known.sort());
+    expect(source('server/media/media_type.h')).toContain(
+      `max_media_bytes = ${limits.max_media_bytes >> 20} << 20`,
+    );
+    expect(source('render_core/scene/files/tour_check.cpp')).toContain(
+      `max_media = ${limits.max_media};`,
+    );
+    expect([kind_of('a.JPG'), kind_of('a.jpg?x=.mp4'), kind_of('a.svg'), kind_of('mp4')]).toEqual([
+      'image',
+      'image',
+      undefined,
+      undefined,
+    ]);
   });
 });
 
@@ -97,7 +136,8 @@ describe('sounds', () => {
     plays = false;
     refuses = false;
     play(): Promise<void> {
-      if (this.refuses) return Promise.reject(Object.assign(new Error('x'), { name: 'NotAllowedError' }));
+      if (this.refuses)
+        return Promise.reject(Object.assign(new Error('x'), { name: 'NotAllowedError' }));
       this.plays = true;
       return Promise.resolve();
     }
@@ -119,7 +159,7 @@ describe('sounds', () => {
     expect([voice.plays, background.plays, sounds.audible]).toEqual([false, false, false]);
     let heard = false;
     sounds.when_heard(() => (heard = true));
-    expect(heard).toBe(true); // a tour goes on without what nobody hears
+    expect(heard).toBe(true); // a tour continues without what nobody hears
     sounds.touch();
     expect([voice.plays, background.plays, sounds.audible]).toEqual([true, true, true]);
   });

@@ -1,11 +1,19 @@
 // Walking, flights, and the glide after a gesture.
 import { describe, expect, it } from 'vitest';
-import { angle_between, axis_angle, identity, look_at, rotate, slerp, type Vec3 } from '#client/base/vector';
+import {
+  angle_between,
+  axis_angle,
+  identity,
+  look_at,
+  rotate,
+  slerp,
+  type Vec3,
+} from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
 import { no_axes, sum_of } from '#client/camera/movement';
-import { place_of, ray_through, surface_of } from '#client/camera/ray';
+import { project, ray_through, surface_of } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
 import { gamepad_axes } from '#client/input/gamepad';
 import { Taps } from '#client/input/pointers';
@@ -106,15 +114,20 @@ describe('a double click', () => {
     const at = eye([1, 2, 3], 0.4);
     const { origin, direction } = ray_through(at, 0.3, 0.8, 1.5);
     const point = origin.map((v, i) => v + direction[i]! * 7) as unknown as Vec3;
-    const [x, y] = place_of(point, at, 1.5)!;
+    const [x, y] = project(point, at, 1.5)!;
     expect(x).toBeCloseTo(0.3, 6);
     expect(y).toBeCloseTo(0.8, 6);
     const back = origin.map((v, i) => v - direction[i]!) as unknown as Vec3;
-    expect(place_of(back, at, 1.5)).toBeUndefined();
+    expect(project(back, at, 1.5)).toBeUndefined();
   });
 
   it('takes four points of the view for a surface that faces the eye', () => {
-    const [left, right, top, bottom]: Vec3[] = [[-1, 2, 5], [1, 2, 5], [0, 2, 6], [0, 2, 4]];
+    const [left, right, top, bottom]: Vec3[] = [
+      [-1, 2, 5],
+      [1, 2, 5],
+      [0, 2, 6],
+      [0, 2, 4],
+    ];
     const floor = surface_of([left, right, top, bottom], [0, 0, 0])!;
     expect(floor.point).toEqual([0, 2, 5]);
     expect(floor.normal.map((v) => Math.round(v * 1e9) / 1e9 + 0)).toEqual([0, -1, 0]);
@@ -172,7 +185,13 @@ describe('a flight', () => {
 
 describe('orientations', () => {
   it('look at a point with up upright, in all directions', () => {
-    for (const to of [[0, 0, 5], [0, 0, -5], [5, 1, 0], [-5, -2, 1], [1, -3, -2]] as Vec3[]) {
+    for (const to of [
+      [0, 0, 5],
+      [0, 0, -5],
+      [5, 1, 0],
+      [-5, -2, 1],
+      [1, -3, -2],
+    ] as Vec3[]) {
       const q = look_at([0, 0, 0], to, [0, -1, 0]);
       const size = Math.hypot(...to);
       expect_vec(rotate(q, [0, 0, 1]), to.map((v) => v / size) as unknown as Vec3);
@@ -197,7 +216,7 @@ describe('inertia', () => {
     return inertia.released(80 + pause_ms);
   };
 
-  it('goes on as fast as the pointer went, and fades', () => {
+  it('continues as fast as the pointer went, and fades', () => {
     const inertia = new Inertia();
     expect(flick(inertia)).toBe(true);
     const first = inertia.step(0.01)!;

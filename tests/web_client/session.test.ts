@@ -48,7 +48,7 @@ beforeEach(() => {
       stats: () => undefined,
       picked: () => undefined,
       pinged: () => undefined,
-      company: () => undefined,
+      participants: () => undefined,
       lead: () => undefined,
       notice: (message) => notices.push(message),
       stayed: (message) => stayed.push(message),
@@ -98,14 +98,23 @@ describe('greeting', () => {
     socket(0).say({ case: 'welcome', value: { config: { encoder: 'x264' } } });
     expect(last_state()).toEqual({ phase: 'live' });
     expect(configs).toEqual(['x264']);
-    expect(socket(0).sent('pose').map((sample) => sample.poseId)).toEqual([1n]);
+    expect(
+      socket(0)
+        .sent('pose')
+        .map((sample) => sample.poseId),
+    ).toEqual([1n]);
   });
 
   it('shows the queue while it waits for its turn', () => {
     session.start();
     socket(0).events.opened();
     socket(0).say({ case: 'queue', value: { position: 3, estimateS: 40 } });
-    const waiting: SessionState = { phase: 'queued', position: 3, estimate_s: 40, for_scene: false };
+    const waiting: SessionState = {
+      phase: 'queued',
+      position: 3,
+      estimate_s: 40,
+      for_scene: false,
+    };
     expect(last_state()).toEqual(waiting);
     socket(0).say({ case: 'queue', value: { position: 1, estimateS: 9, forScene: true } });
     const loading: SessionState = { phase: 'queued', position: 1, estimate_s: 9, for_scene: true };
@@ -138,7 +147,11 @@ describe('reconnecting', () => {
       pose: { poseId: 7n },
     });
     socket(1).say({ case: 'welcome', value: {} });
-    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([7n]);
+    expect(
+      socket(1)
+        .sent('pose')
+        .map((sample) => sample.poseId),
+    ).toEqual([7n]);
     expect(last_state()).toEqual({ phase: 'live' });
   });
 
@@ -158,7 +171,9 @@ describe('reconnecting', () => {
     session.retry();
     socket(1).events.opened();
     const resume = socket(1).sent('hello')[0]!.resume!;
-    expect(resume.path?.samples.map(({ clientTimeUs }) => Number(clientTimeUs) / 1e6)).toEqual(left_s);
+    expect(resume.path?.samples.map(({ clientTimeUs }) => Number(clientTimeUs) / 1e6)).toEqual(
+      left_s,
+    );
   });
 
   it('follows silence, but not a server that has a heartbeat', () => {
@@ -254,7 +269,7 @@ describe('errors', () => {
     expect(socket(1).sent('hello')[0]?.token).toBe('better');
   });
 
-  it('passes on what is not fatal and goes on', () => {
+  it('passes on what is not fatal and continues', () => {
     const first = go_live();
     const value = { code: Error_Code.RATE_LIMITED, message: 'slow down', fatal: false };
     first.say({ case: 'error', value });
@@ -269,7 +284,11 @@ describe('drain', () => {
     session.send_pose(pose(4n));
     old.say({ case: 'drain', value: { deadlineMs: 5000 } });
     welcome(socket(1), 'nvenc');
-    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n]);
+    expect(
+      socket(1)
+        .sent('pose')
+        .map((sample) => sample.poseId),
+    ).toEqual([4n]);
     old.frame({ frameId: 10n });
     expect(old.closed).toBe(false);
     expect(configs).toEqual(['x264']);
@@ -283,7 +302,11 @@ describe('drain', () => {
     expect(old.sent('ack')).toHaveLength(1);
     expect(socket(1).sent('ack')).toEqual([]);
     session.send_pose(pose(5n));
-    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n, 4n, 5n]);
+    expect(
+      socket(1)
+        .sent('pose')
+        .map((sample) => sample.poseId),
+    ).toEqual([4n, 4n, 5n]);
   });
 
   it('tries again when the new connection fails, while the old one lives', () => {
@@ -307,7 +330,7 @@ describe('drain', () => {
     expect(sockets.length).toBeLessThan(8); // 28 with half a second between two
   });
 
-  it('goes on with the new connection when the old one ends first', () => {
+  it('continues with the new connection when the old one ends first', () => {
     const old = go_live();
     session.send_pose(pose(4n));
     old.say({ case: 'drain', value: {} });
@@ -315,7 +338,11 @@ describe('drain', () => {
     expect(last_state()?.phase).toBe('connecting');
     welcome(socket(1));
     expect(last_state()).toEqual({ phase: 'live' });
-    expect(socket(1).sent('pose').map((sample) => sample.poseId)).toEqual([4n]);
+    expect(
+      socket(1)
+        .sent('pose')
+        .map((sample) => sample.poseId),
+    ).toEqual([4n]);
     expect(sockets).toHaveLength(2);
   });
 
@@ -389,7 +416,10 @@ describe('another scene', () => {
     first.say({ case: 'error', value: { code: Error_Code.UNAUTHORIZED, message: 'not yours' } });
     expect(stayed).toEqual(['not yours']);
     expect(notices).toEqual([]);
-    first.say({ case: 'error', value: { code: Error_Code.UNAUTHORIZED, message: 'something else' } });
+    first.say({
+      case: 'error',
+      value: { code: Error_Code.UNAUTHORIZED, message: 'something else' },
+    });
     expect(notices).toEqual(['something else']);
     first.events.closed(1006, '');
     time.advance(10_000);

@@ -4,8 +4,13 @@ import { describe, expect, it } from 'vitest';
 import { column_in_tile, height_of, Kind, kind_of, PackedTiles, tile_at } from '#client/walk/tiles';
 
 /** The index and the tiles, packed. */
-function packed(tiles: readonly (readonly number[])[], unpacked = tiles.map((bytes) => bytes.length)): Uint8Array {
-  const streams = tiles.map((bytes) => (bytes.length > 0 ? deflateSync(Uint8Array.from(bytes)) : Buffer.alloc(0)));
+function packed(
+  tiles: readonly (readonly number[])[],
+  unpacked = tiles.map((bytes) => bytes.length),
+): Uint8Array {
+  const streams = tiles.map((bytes) =>
+    bytes.length > 0 ? deflateSync(Uint8Array.from(bytes)) : Buffer.alloc(0),
+  );
   const index = new Uint32Array(streams.flatMap((stream, t) => [stream.length, unpacked[t]!]));
   return Uint8Array.from(Buffer.concat([Buffer.from(index.buffer), ...streams]));
 }
@@ -13,7 +18,16 @@ function packed(tiles: readonly (readonly number[])[], unpacked = tiles.map((byt
 const zigzag = (d: number): number[] => [((2 * d) & 127) | 128, d >> 6];
 
 /** Six columns of a place each at 10 cells, but the last one has none and the first one two. */
-const six = [...[2, 1, 1, 1, 1, 0], ...[0, 3, 0, 1, 2, 0], ...zigzag(160), ...zigzag(200), 0, 0, 0, 0];
+const six = [
+  ...[2, 1, 1, 1, 1, 0],
+  ...[0, 3, 0, 1, 2, 0],
+  ...zigzag(160),
+  ...zigzag(200),
+  0,
+  0,
+  0,
+  0,
+];
 
 describe('a tile', () => {
   it('has the places of its columns', () => {
@@ -21,7 +35,14 @@ describe('a tile', () => {
     const { first, places } = tiles.at(0);
     expect([...first]).toEqual([0, 2, 3, 4, 5, 6, 6]);
     expect([...places].map(height_of)).toEqual([10, 12.5, 10, 10, 10, 10]);
-    expect([...places].map(kind_of)).toEqual([Kind.clear, Kind.obstacle, Kind.clear, Kind.near, Kind.low, Kind.clear]);
+    expect([...places].map(kind_of)).toEqual([
+      Kind.clear,
+      Kind.obstacle,
+      Kind.clear,
+      Kind.near,
+      Kind.low,
+      Kind.clear,
+    ]);
     expect(column_in_tile(tiles, 1, 1)).toBe(4);
   });
 
@@ -36,7 +57,9 @@ describe('a tile', () => {
     ['a tile', six.slice(0, 5)],
     ['a tile', six.slice(0, 8)],
   ])('is refused: %s', (field, bytes) => {
-    expect(() => new PackedTiles(3, 2, 2, packed([bytes])).at(0)).toThrow(`walk file: ${field} is out of range`);
+    expect(() => new PackedTiles(3, 2, 2, packed([bytes])).at(0)).toThrow(
+      `walk file: ${field} is out of range`,
+    );
   });
 
   it('is refused where it has more or less than the index says, or is no stream', () => {
@@ -67,7 +90,12 @@ describe('the tiles of a map', () => {
   });
 
   it('are kept while others are not used more', () => {
-    const tiles = new PackedTiles(64 * 30, 1, 64 * 30, packed(Array.from({ length: 30 }, () => flat(64))));
+    const tiles = new PackedTiles(
+      64 * 30,
+      1,
+      64 * 30,
+      packed(Array.from({ length: 30 }, () => flat(64))),
+    );
     const [first, second] = [tiles.at(0), tiles.at(1)];
     for (let t = 2; t < 21; ++t) {
       tiles.at(t);
@@ -87,13 +115,20 @@ describe('the tiles of a map', () => {
 
   it('are refused where the index is not theirs, without memory for what it names', () => {
     const right = packed([six]);
-    for (const [at, value] of [[0, 4], [0, 500], [4, 0], [4, 2 ** 31]] as const) {
+    for (const [at, value] of [
+      [0, 4],
+      [0, 500],
+      [4, 0],
+      [4, 2 ** 31],
+    ] as const) {
       const forged = right.slice();
       new DataView(forged.buffer).setUint32(at, value, true);
       expect(() => new PackedTiles(3, 2, 6, forged)).toThrow('index');
     }
     expect(() => new PackedTiles(3, 2, 2 ** 24, right)).toThrow('places');
-    expect(() => new PackedTiles(3, 2, 6, packed([Array<number>(600).fill(0)], [200]))).not.toThrow();
+    expect(
+      () => new PackedTiles(3, 2, 6, packed([Array<number>(600).fill(0)], [200])),
+    ).not.toThrow();
     expect(() => new PackedTiles(3, 2, 6, packed([six], [0]))).toThrow('index');
     expect(() => new PackedTiles(3, 2, 6, right.slice(0, 7))).toThrow('index');
     expect(() => new PackedTiles(3, 2, 6, Uint8Array.from([...right, 0]))).toThrow('index');

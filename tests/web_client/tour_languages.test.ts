@@ -10,30 +10,83 @@ const up: Vec3 = [0, -1, 0];
 describe('tours in several languages', () => {
   it('speak the language of the visitor where they can, text by text', () => {
     const place = { position: [0, 0, 0], orientation: [0, 0, 0, 1] };
-    const translations = { de: { title: 'Halle', caption: '1904 erbaut.' }, 'zh-Hans': { title: '大厅' }, nl: {} };
-    const stops = [{ ...place, title: 'Hall', caption: 'Built in 1904.', translations }, { ...place, title: 'Stairs' }];
-    const tours = read_tours([{ title: 'Ground floor', translations: { de: { title: 'Erdgeschoss' } }, stops }], up, 1);
+    const translations = {
+      de: { title: 'Halle', caption: '1904 erbaut.' },
+      'zh-Hans': { title: '大厅' },
+      nl: {},
+    };
+    const stops = [
+      { ...place, title: 'Hall', caption: 'Built in 1904.', translations },
+      { ...place, title: 'Stairs' },
+    ];
+    const tours = read_tours(
+      [{ title: 'Ground floor', translations: { de: { title: 'Erdgeschoss' } }, stops }],
+      up,
+      1,
+    );
     const read = (...readers: string[]): (string | undefined)[] =>
-      tours_for(tours, readers).flatMap((tour) => [tour, ...tour.stops].flatMap((item) => [item.title, item.caption, item.language]));
+      tours_for(tours, readers).flatMap((tour) =>
+        [tour, ...tour.stops].flatMap((item) => [item.title, item.caption, item.language]),
+      );
     const own = ['Ground floor', undefined, ''];
     expect(read('en')).toEqual([...own, 'Hall', 'Built in 1904.', '', 'Stairs', '', '']);
-    expect(read('de-CH', 'de')).toEqual(['Erdgeschoss', undefined, 'de', 'Halle', '1904 erbaut.', 'de', 'Stairs', '', '']);
-    expect(read('zh-TW', 'zh-Hans')).toEqual([...own, '大厅', 'Built in 1904.', 'zh-Hans', 'Stairs', '', '']);
+    expect(read('de-CH', 'de')).toEqual([
+      'Erdgeschoss',
+      undefined,
+      'de',
+      'Halle',
+      '1904 erbaut.',
+      'de',
+      'Stairs',
+      '',
+      '',
+    ]);
+    expect(read('zh-TW', 'zh-Hans')).toEqual([
+      ...own,
+      '大厅',
+      'Built in 1904.',
+      'zh-Hans',
+      'Stairs',
+      '',
+      '',
+    ]);
     expect(read('ZH-HANS')[3]).toBe('大厅');
     expect(read('nl', 'de').slice(3, 6)).toEqual(['Hall', 'Built in 1904.', 'nl']);
     // What an author does not edit is saved as it was.
-    const [written] = write_tours(tours) as { translations: object; stops: { translations?: object }[] }[];
+    const [written] = write_tours(tours) as {
+      translations: object;
+      stops: { translations?: object }[];
+    }[];
     expect(written).toMatchObject({ translations: { de: { title: 'Erdgeschoss' } } });
-    expect(written!.stops.map((stop) => stop.translations)).toEqual([{ de: translations.de, 'zh-Hans': translations['zh-Hans'] }, undefined]);
-    expect(read_tours([written], up, 1)[0]!.stops[0]!.translations.get('de')).toEqual(translations.de);
+    expect(written!.stops.map((stop) => stop.translations)).toEqual([
+      { de: translations.de, 'zh-Hans': translations['zh-Hans'] },
+      undefined,
+    ]);
+    expect(read_tours([written], up, 1)[0]!.stops[0]!.translations.get('de')).toEqual(
+      translations.de,
+    );
   });
 
   it.each([
     [[{ stops: [], translations: [] }], undefined],
     [[{ stops: [], translations: 'de' }], 'tours[0].translations: is not an object'],
-    [[{ stops: [], translations: { de: { title: 1 } } }], 'tours[0].translations.de.title: is not a text'],
-    [[{ stops: [], translations: Object.fromEntries(Array.from({ length: 33 }, (_, i) => [`x${i}`, {}])) }], 'has 33 entries, at most 32'],
-    [[{ stops: [], translations: JSON.parse('{"__proto__": {"title": "x"}}') as object }], undefined],
+    [
+      [{ stops: [], translations: { de: { title: 1 } } }],
+      'tours[0].translations.de.title: is not text',
+    ],
+    [
+      [
+        {
+          stops: [],
+          translations: Object.fromEntries(Array.from({ length: 33 }, (_, i) => [`x${i}`, {}])),
+        },
+      ],
+      'has 33 entries, at most 32',
+    ],
+    [
+      [{ stops: [], translations: JSON.parse('{"__proto__": {"title": "x"}}') as object }],
+      undefined,
+    ],
   ])('have translations that can be read: %j', (document, complaint) => {
     const read = (): Tour[] => read_tours(document, up, 1);
     if (complaint === undefined) expect(read()).toHaveLength(1);
@@ -43,9 +96,14 @@ describe('tours in several languages', () => {
 
 describe('the languages of an author', () => {
   const hall: Stop = {
-    ...{ title: 'Hall', caption: 'about Hall', ...untranslated },
+    title: 'Hall',
+    caption: 'about Hall',
+    ...untranslated,
     eye: { position: [1, 2, 3], orientation: identity, fov_y_rad: 1 },
-    ...{ marker: undefined, stay_s: undefined, fly_s: undefined, portal: undefined },
+    marker: undefined,
+    stay_s: undefined,
+    fly_s: undefined,
+    portal: undefined,
   };
   const draft = (): TourDraft => {
     const made = new TourDraft();
@@ -53,7 +111,11 @@ describe('the languages of an author', () => {
     return made;
   };
   const write = (made: TourDraft, language: string, change: Partial<Stop>): void =>
-    made.change(0, worded(made.stops[0]!, language, change), `${Object.keys(change).join()} 0 ${language}`);
+    made.change(
+      0,
+      worded(made.stops[0]!, language, change),
+      `${Object.keys(change).join()} 0 ${language}`,
+    );
 
   it('are edited one by one', () => {
     const made = draft();

@@ -15,11 +15,20 @@ describe('the player', () => {
     caption,
     ...untranslated,
     eye: { position: [x, 0, 0], orientation: identity, fov_y_rad: 1 },
-    ...{ marker: undefined, stay_s: 2, fly_s: undefined, portal: undefined },
+    marker: undefined,
+    stay_s: 2,
+    fly_s: undefined,
+    portal: undefined,
   });
-  const tour: Tour = { title: 'a tour', ...untranslated, stops: [1, 2, 3].map((x) => stop(x)), way: undefined, starts_itself: false };
+  const tour: Tour = {
+    title: 'a tour',
+    ...untranslated,
+    stops: [1, 2, 3].map((x) => stop(x)),
+    way: undefined,
+    starts_itself: false,
+  };
 
-  /** A camera that flies when it is told to, by hand. */
+  /** A camera that a test flies by hand. */
   function guided(reduced_motion = false) {
     const time = new FakeTime();
     let eye: Eye = { position: [0, 0, 0], orientation: identity, fov_y_rad: 1 };
@@ -119,7 +128,7 @@ describe('the player', () => {
     expect(arrive()).toBe(1);
   });
 
-  it('plays: stays at each stop as long as it says, then goes on', () => {
+  it('plays: stays at each stop as long as it says, then continues', () => {
     const { player, time, arrive, flying, state } = guided();
     player.load([tour]);
     player.play();

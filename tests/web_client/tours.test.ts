@@ -19,7 +19,14 @@ describe('tours of a sidecar', () => {
       title: 'Ground floor',
       autoplay: true,
       stops: [
-        { title: 'Hall', position: [0, 0, 0], look_at: [0, 0, 4], fov_deg: 50, stay_s: 2, fly_s: 3 },
+        {
+          title: 'Hall',
+          position: [0, 0, 0],
+          look_at: [0, 0, 4],
+          fov_deg: 50,
+          stay_s: 2,
+          fly_s: 3,
+        },
         {
           title: 'Stairs',
           caption: 'Built in 1904.',
@@ -50,11 +57,14 @@ describe('tours of a sidecar', () => {
       .map((name) => readFileSync(new URL(`../../${name}`, import.meta.url), 'utf8'))
       .join('');
     const limit = (name: string): number => {
-      const found = new RegExp(`constexpr (?:std::size_t|float) ${name} = (\\d[\\d']*)(?: << (\\d+))?;`).exec(server);
+      const found = new RegExp(
+        `constexpr (?:std::size_t|float) ${name} = (\\d[\\d']*)(?: << (\\d+))?;`,
+      ).exec(server);
       if (!found) throw new Error(`the server has no ${name}`);
       return Number(found[1]!.replaceAll("'", '')) * 2 ** Number(found[2] ?? 0);
     };
-    for (const name of ['max_tours', 'max_stops', 'max_languages'] as const) expect(limits[name]).toBe(limit(name));
+    for (const name of ['max_tours', 'max_stops', 'max_languages'] as const)
+      expect(limits[name]).toBe(limit(name));
     expect(limits.longest_stay_s).toBe(limit('longest_stay_s'));
     expect(limits.longest_flight_s).toBe(limit('longest_flight_s'));
     expect(limits.max_sidecar_bytes).toBe(limit('max_sent_sidecar_bytes'));
@@ -78,10 +88,16 @@ describe('tours of a sidecar', () => {
   it.each([
     [{}, 'tours: is not a list'],
     [[{ title: 'x' }], "tours[0]: 'stops' is missing"],
-    [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: is not 3 numbers'],
-    [[{ stops: [{ position: [1, 2, 'x'], orientation: [0, 0, 0, 1] }] }], 'position[2]: is not a number'],
-    [[{ stops: [{ position: [0, 0, 0] }] }], "tours[0].stops[0]: 'look_at' or 'orientation' is missing"],
-    [[{ stops: [], title: 7 }], 'tours[0].title: is not a text'],
+    [[{ stops: [{ position: [1, 2] }] }], 'tours[0].stops[0].position: does not have 3 numbers'],
+    [
+      [{ stops: [{ position: [1, 2, 'x'], orientation: [0, 0, 0, 1] }] }],
+      'position[2]: is not a number',
+    ],
+    [
+      [{ stops: [{ position: [0, 0, 0] }] }],
+      "tours[0].stops[0]: 'look_at' or 'orientation' is missing",
+    ],
+    [[{ stops: [], title: 7 }], 'tours[0].title: is not text'],
     [Array(33).fill({ stops: [] }), 'has 33 entries, at most 32'],
   ])('say what is wrong with %j', (document, complaint) => {
     expect(() => read_tours(document, up, 1)).toThrow(complaint);
@@ -141,14 +157,14 @@ describe("the SuperSplat viewer's settings.json", () => {
   });
 
   it.each([
-    [{ version: 1 }, 'version 1 is not read here'],
+    [{ version: 1 }, 'version 1 is not supported'],
     [{ version: 2, cameras: [{}] }, "settings.json.cameras[0]: 'initial' is missing"],
     [{ version: 2, annotations: 5 }, 'annotations: is not a list'],
     [
       { version: 2, animTracks: [{ duration: 1, frameRate: 30, keyframes: { times: [0, 0] } }] },
       'times: are not increasing',
     ],
-  ])('is refused with its place where it is wrong: %j', (document, complaint) => {
+  ])('is refused with the field that is wrong: %j', (document, complaint) => {
     expect(() => read_supersplat(document, 1)).toThrow(complaint);
   });
 });
@@ -171,7 +187,12 @@ describe('a film of the camera', () => {
     film_flight(film(change), up).at(time_s).position[0];
 
   it('passes its shots at their times, without a jump in speed', () => {
-    for (const [time_s, x] of [[0, 0], [1, 2], [3, 4], [4, 4]] as const) {
+    for (const [time_s, x] of [
+      [0, 0],
+      [1, 2],
+      [3, 4],
+      [4, 4],
+    ] as const) {
       expect(x_at({}, time_s)).toBeCloseTo(x, 6);
     }
     const h = 1e-4;
@@ -243,13 +264,24 @@ describe('a shared link', () => {
   });
 
   it("knows from the page's policy who may show it", () => {
-    const policy = (sites: string): string => `default-src 'none'; frame-ancestors ${sites}; img-src *`;
+    const policy = (sites: string): string =>
+      `default-src 'none'; frame-ancestors ${sites}; img-src *`;
     const [a, b] = ['https://a.example', 'https://*.b.example'];
     const both = policy(`${a} ${b}`);
     for (const [header, sites] of [
-      ...[[policy("'none'"), []], [both, [a, b]], [policy('*'), undefined]],
-      ...[["default-src 'self'", undefined], [null, undefined]],
-      ...[[`${both}, ${policy(b)}`, [b]], [`${both}, default-src 'self'`, [a, b]]],
+      ...[
+        [policy("'none'"), []],
+        [both, [a, b]],
+        [policy('*'), undefined],
+      ],
+      ...[
+        ["default-src 'self'", undefined],
+        [null, undefined],
+      ],
+      ...[
+        [`${both}, ${policy(b)}`, [b]],
+        [`${both}, default-src 'self'`, [a, b]],
+      ],
       [`default-src 'self', ${both}, ${policy("'none'")}`, []],
     ] as const) {
       expect(frame_sites(header), String(header)).toEqual(sites);

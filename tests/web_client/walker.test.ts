@@ -2,13 +2,24 @@
 import { describe, expect, it } from 'vitest';
 import { find_path } from '#client/walk/path';
 import { tiles_in } from '#client/walk/tiles';
-import { clear_at, eyes_of, read_walk_file, storey_at, type Stand, type WalkMap } from '#client/walk/walk_map';
+import {
+  clear_at,
+  eyes_of,
+  read_walk_file,
+  storey_at,
+  type Stand,
+  type WalkMap,
+} from '#client/walk/walk_map';
 import { move, stand_below, straight } from '#client/walk/walker';
 import golden from '../support/walk_golden.json';
 import { expect_vec } from './cameras';
 import { file, flat_map, map, random_from } from './walk_maps';
 
-const stand = ([east, north, height]: number[]): Stand => ({ east: east!, north: north!, height: height! });
+const stand = ([east, north, height]: number[]): Stand => ({
+  east: east!,
+  north: north!,
+  height: height!,
+});
 
 const is_clear = (on: WalkMap, { east, north, height }: Stand): boolean =>
   clear_at(on, Math.floor(east), Math.floor(north), height) >= 0;
@@ -124,8 +135,10 @@ describe('a walker', () => {
         const before = at;
         at = move(ground, at, x, y);
         way += distance(before, at);
-        if (!is_clear(ground, at)) throw new Error(`frame ${frame}: off the ground at ${JSON.stringify(at)}`);
-        if (Math.abs(at.height - before.height) > ground.step) throw new Error(`frame ${frame}: fell`);
+        if (!is_clear(ground, at))
+          throw new Error(`frame ${frame}: off the ground at ${JSON.stringify(at)}`);
+        if (Math.abs(at.height - before.height) > ground.step)
+          throw new Error(`frame ${frame}: fell`);
       }
       expect(way).toBeGreaterThan(500);
     }
@@ -140,7 +153,16 @@ function shortest_of(on: WalkMap): number {
   for (let changed = true; changed; ) {
     changed = false;
     for (const [at, gone] of [...way])
-      for (const [x, y] of [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]] as const) {
+      for (const [x, y] of [
+        [1, 0],
+        [0, 1],
+        [-1, 0],
+        [0, -1],
+        [1, 1],
+        [-1, 1],
+        [-1, -1],
+        [1, -1],
+      ] as const) {
         const [east, north] = [(at % width) + x, Math.floor(at / width) + y];
         if (!clear(east, north) || !clear(east - x, north) || !clear(east, north - y)) continue;
         const next = north * width + east;
@@ -168,7 +190,11 @@ describe('a path', () => {
 
   it('leads around a wall, also into another tile', async () => {
     const yard = flat_map(100, 70, (x, y) => x !== 63 || y >= 35);
-    const path = await find_path(yard, { east: 58.5, north: 5.5, height: 10 }, { east: 68.5, north: 5.5, height: 10 });
+    const path = await find_path(
+      yard,
+      { east: 58.5, north: 5.5, height: 10 },
+      { east: 68.5, north: 5.5, height: 10 },
+    );
     const total = path.slice(1).reduce((sum, at, k) => sum + distance(path[k]!, at), 0);
     expect(total).toBeGreaterThan(59.5);
     expect(total).toBeLessThan(64);
@@ -178,7 +204,11 @@ describe('a path', () => {
     const random = random_from(5);
     for (let round = 0; round < 10; ++round) {
       const maze = flat_map(30, 24, (x, y) => x + y < 4 || x + y > 48 || random() > 0.3);
-      const path = await find_path(maze, { east: 0.5, north: 0.5, height: 10 }, { east: 29.5, north: 23.5, height: 10 });
+      const path = await find_path(
+        maze,
+        { east: 0.5, north: 0.5, height: 10 },
+        { east: 29.5, north: 23.5, height: 10 },
+      );
       const shortest = shortest_of(maze);
       expect(path.length > 0).toBe(shortest < Infinity);
       const total = path.slice(1).reduce((sum, at, k) => sum + distance(path[k]!, at), 0);
@@ -188,7 +218,10 @@ describe('a path', () => {
 
   it('is not sought any further when nobody wants it', async () => {
     const yard = flat_map(40, 40, () => true);
-    const [from, to] = [{ east: 0.5, north: 0.5, height: 10 }, { east: 39.5, north: 39.5, height: 10 }];
+    const [from, to] = [
+      { east: 0.5, north: 0.5, height: 10 },
+      { east: 39.5, north: 39.5, height: 10 },
+    ];
     expect(await find_path(yard, from, to, () => false)).toEqual([]);
     expect(await find_path(yard, from, to, () => true)).toEqual([from, to]);
   });
@@ -196,7 +229,11 @@ describe('a path', () => {
   it('is none where there is no way', async () => {
     const parted = flat_map(40, 10, (x) => x !== 20);
     const at = (east: number): Stand => ({ east, north: 5.5, height: 10 });
-    for (const [from, to] of [[5.5, 30.5], [5.5, 20.5], [-5.5, 5.5]] as const)
+    for (const [from, to] of [
+      [5.5, 30.5],
+      [5.5, 20.5],
+      [-5.5, 5.5],
+    ] as const)
       expect(await find_path(parted, at(from), at(to))).toEqual([]);
   });
 });

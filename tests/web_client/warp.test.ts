@@ -1,7 +1,15 @@
 import { describe, expect, it } from 'vitest';
-import { add, angle_between, axis_angle, identity, multiply, rotate, type Vec3 } from '#client/base/vector';
+import {
+  add,
+  angle_between,
+  axis_angle,
+  identity,
+  multiply,
+  rotate,
+  type Vec3,
+} from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
-import { place_of } from '#client/camera/ray';
+import { project } from '#client/camera/ray';
 import { TurnForecast } from '#client/present/turn_forecast';
 import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
@@ -18,7 +26,7 @@ const eye = (change: Partial<Eye> = {}): Eye => ({
 
 /** Place of a point of the scene in the image of an eye, -1…1. */
 function seen(point: Vec3, by: Eye): readonly [number, number] {
-  const [x, y] = place_of(point, by, aspect)!;
+  const [x, y] = project(point, by, aspect)!;
   return [2 * x - 1, 2 * y - 1];
 }
 
@@ -36,7 +44,11 @@ describe('a warped picture', () => {
   it('shows far things where they are, whatever turn, roll and field of view', () => {
     const picture = eye({ fov_y_rad: widened_fov(1, 1.26) });
     const view = eye({ orientation: multiply(turn, axis_angle([0, 0, 1], 0.2)), fov_y_rad: 1.1 });
-    for (const point of [[0, 0, 9], [3, -2, 9], [-4, 1, 8]] as Vec3[]) {
+    for (const point of [
+      [0, 0, 9],
+      [3, -2, 9],
+      [-4, 1, 8],
+    ] as Vec3[]) {
       expect_same_place(point, picture, view, Infinity);
     }
   });
@@ -45,8 +57,13 @@ describe('a warped picture', () => {
     const picture = eye({ position: [0, 0, -5] });
     const view = eye({ position: [0.6, 0.2, -5.1], orientation: turn });
     // On the plane through the focus, five ahead of the view.
-    const on_plane = (x: number, y: number): Vec3 => add(view.position, rotate(view.orientation, [x, y, 5]));
-    for (const [x, y] of [[0, 0], [1, 0.5], [-2, -1]] as const) {
+    const on_plane = (x: number, y: number): Vec3 =>
+      add(view.position, rotate(view.orientation, [x, y, 5]));
+    for (const [x, y] of [
+      [0, 0],
+      [1, 0.5],
+      [-2, -1],
+    ] as const) {
       expect_same_place(on_plane(x, y), picture, view, 5);
     }
   });
@@ -101,7 +118,9 @@ describe('the forecast of a turn', () => {
     expect(forecast.eye_later(0)).toBeUndefined();
     forecast.moved({ pose_id: 1, time_us: 0, eye: eye_at(0), distance: Infinity });
     forecast.moved({ pose_id: 2, time_us: 20_000, eye: eye_at(0.02), distance: Infinity });
-    expect(angle_between(forecast.eye_later(20_000)!.orientation, eye_at(0.02).orientation)).toBeCloseTo(0.1, 3);
+    expect(
+      angle_between(forecast.eye_later(20_000)!.orientation, eye_at(0.02).orientation),
+    ).toBeCloseTo(0.1, 3);
     const s = turn(forecast, 4, 3, 1);
     expect(ahead(forecast, 4, s)).toBeCloseTo(0.5, 3);
   });

@@ -24,11 +24,17 @@ describe('client messages', () => {
 
   it.each<[ClientBody, string]>([
     [
-      { case: 'hello', value: { version: 1, sceneId: 'city', ...viewport, decoders, token: 'secret', settings } },
+      {
+        case: 'hello',
+        value: { version: 1, sceneId: 'city', ...viewport, decoders, token: 'secret', settings },
+      },
       golden.client_hello,
     ],
     [
-      { case: 'pose', value: { poseId: 300n, clientTimeUs: 1234567890123n, worldFromCamera, fovYRad: 1 } },
+      {
+        case: 'pose',
+        value: { poseId: 300n, clientTimeUs: 1234567890123n, worldFromCamera, fovYRad: 1 },
+      },
       golden.client_pose,
     ],
     [{ case: 'ack', value: { frameId: 7n, ...times } }, golden.client_ack],
@@ -39,7 +45,11 @@ describe('client messages', () => {
 
 describe('server messages', () => {
   it('decodes an error', () => {
-    const value = { code: Error_Code.SERVER_FULL, message: '8 of 8 sessions are in use', fatal: true };
+    const value = {
+      code: Error_Code.SERVER_FULL,
+      message: '8 of 8 sessions are in use',
+      fatal: true,
+    };
     const incoming = decode_server_message(bytes_of(golden.server_error));
     expect(incoming).toMatchObject({ kind: 'message', body: { case: 'error', value } });
   });

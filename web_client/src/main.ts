@@ -4,18 +4,13 @@ import { AccessToken } from './session/token';
 import { translate_page } from './text/page';
 import { CardView } from './ui/card';
 import { show_gallery } from './ui/gallery';
-import type { SessionStatus } from './ui/session_status';
-import { mount_viewer } from './ui/viewer';
 import { broken_card, unsupported_card } from './ui/wording';
+import { mount_viewer } from './viewer';
 
 async function main(): Promise<void> {
   translate_page();
   const card = new CardView();
-  const viewer: { status?: SessionStatus } = {};
-  const broken = (message: string): void => {
-    if (viewer.status) viewer.status.break_off(message);
-    else card.show(broken_card(message));
-  };
+  let broken = (message: string): void => card.show(broken_card(message));
   window.addEventListener('error', (event) => {
     // This is no error: a size changed twice within one frame, and the next frame reports it.
     if (!event.message.startsWith('ResizeObserver loop')) broken(event.message);
@@ -25,10 +20,11 @@ async function main(): Promise<void> {
   const unsupported = unsupported_card(globalThis);
   if (unsupported) return card.show(unsupported);
   const token = new AccessToken(location, history, browser_storage('sessionStorage'));
-  const wish = new URLSearchParams(location.search).get('scene') ?? '';
-  const scenes = wish ? [] : await list_scenes(location.href, token.value);
-  if (scenes.length > 1 && leaves_scene_open(location.href)) return show_gallery(scenes, token.value);
-  viewer.status = mount_viewer(card, token, wish || (scenes[0]?.id ?? ''));
+  const requested = new URLSearchParams(location.search).get('scene') ?? '';
+  const scenes = requested ? [] : await list_scenes(location.href, token.value);
+  if (scenes.length > 1 && leaves_scene_open(location.href))
+    return show_gallery(scenes, token.value);
+  broken = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''));
 }
 
 void main();

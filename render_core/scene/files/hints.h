@@ -33,7 +33,7 @@ inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 ///   "background": "#rrggbb"
 ///   "metres_per_unit": length of a world unit
 ///   "model":      "default", "antialiased" or "2dgs", in place of what the scene's file says
-///   "tours":      for pages, see web_client/README.md
+///   "tours":      for pages, see web_client/TOURS.md
 struct Sidecar {
   struct StartPose {
     glm::vec3 position{0.0f};

@@ -1,7 +1,13 @@
 // Chromium as the tests use it, and a page that records everything that went wrong in it.
 import { existsSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
-import { chromium, type Browser, type BrowserContext, type BrowserContextOptions, type Page } from 'playwright-core';
+import {
+  chromium,
+  type Browser,
+  type BrowserContext,
+  type BrowserContextOptions,
+  type Page,
+} from 'playwright-core';
 import { afterEach } from 'vitest';
 import { settle } from './camera';
 import { clean_up } from './clean_up';
@@ -14,7 +20,12 @@ export const windows = {
   desktop: { viewport: { width: 1280, height: 720 } },
   'desktop-dark': { viewport: { width: 1280, height: 720 }, colorScheme: 'dark' },
   phone: { viewport: { width: 360, height: 640 }, hasTouch: true, isMobile: true },
-  'phone-dark': { viewport: { width: 740, height: 360 }, hasTouch: true, isMobile: true, colorScheme: 'dark' },
+  'phone-dark': {
+    viewport: { width: 740, height: 360 },
+    hasTouch: true,
+    isMobile: true,
+    colorScheme: 'dark',
+  },
 } as const satisfies Record<string, BrowserContextOptions>;
 
 let browser: Browser | undefined;

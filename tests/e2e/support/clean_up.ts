@@ -8,6 +8,8 @@ export const clean_up = (action: () => unknown): number => actions.push(action);
 
 afterAll(async () => {
   for (const action of actions.splice(0).reverse()) {
-    await Promise.resolve().then(action).catch((error: unknown) => console.warn('not cleaned up', error));
+    await Promise.resolve()
+      .then(action)
+      .catch((error: unknown) => console.warn('not cleaned up', error));
   }
 });

@@ -37,15 +37,24 @@ let firefox: Promise<Command> | undefined;
 const errors_of = new Map<string | undefined, string[]>(); // by context
 
 afterEach(async () => {
-  for (const context of errors_of.keys()) await (await firefox!)('browsingContext.close', { context });
+  for (const context of errors_of.keys())
+    await (
+      await firefox!
+    )('browsingContext.close', { context });
   errors_of.clear();
 });
 
 /** Opens the address in a tab that is closed after the test, in a Firefox that all tests of a file share. */
-export async function open_in_firefox(url: string, width: number, height: number): Promise<FirefoxPage> {
+export async function open_in_firefox(
+  url: string,
+  width: number,
+  height: number,
+): Promise<FirefoxPage> {
   firefox ??= start();
   const command = await firefox;
-  const { context } = (await command('browsingContext.create', { type: 'tab' })) as { context: string };
+  const { context } = (await command('browsingContext.create', { type: 'tab' })) as {
+    context: string;
+  };
   const errors: string[] = [];
   errors_of.set(context, errors);
   await command('browsingContext.setViewport', { context, viewport: { width, height } });
@@ -72,9 +81,15 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
     return JSON.parse(result?.value ?? 'null') as T;
   };
   const pointer = (actions: object[]): Promise<unknown> =>
-    command('input.performActions', { context, actions: [{ type: 'pointer', id: 'mouse', actions }] });
+    command('input.performActions', {
+      context,
+      actions: [{ type: 'pointer', id: 'mouse', actions }],
+    });
   const move = ([x, y]: Place, duration = 0): object => ({ type: 'pointerMove', x, y, duration });
-  const [down, up] = ['pointerDown', 'pointerUp'].map((type) => ({ type, button: 0 })) as [object, object];
+  const [down, up] = ['pointerDown', 'pointerUp'].map((type) => ({ type, button: 0 })) as [
+    object,
+    object,
+  ];
   return {
     errors,
     evaluate,
@@ -91,7 +106,10 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
         const { x, y, width, height } = element.getBoundingClientRect();
         return [Math.round(x + width / 2), Math.round(y + height / 2)];
       }`;
-      const at = typeof where === 'string' ? evaluate<Place>(`(${middle})(document.querySelector('${where}'))`) : where;
+      const at =
+        typeof where === 'string'
+          ? evaluate<Place>(`(${middle})(document.querySelector('${where}'))`)
+          : where;
       await pointer([move(await at), down, up]);
     },
     drag: async ([x, y], [dx, dy]) => {
@@ -99,10 +117,15 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
     },
     press: async (value) => {
       const actions = ['keyDown', 'keyUp'].map((type) => ({ type, value }));
-      await command('input.performActions', { context, actions: [{ type: 'key', id: 'keys', actions }] });
+      await command('input.performActions', {
+        context,
+        actions: [{ type: 'key', id: 'keys', actions }],
+      });
     },
     keep_screenshot: async (name) => {
-      const { data } = (await command('browsingContext.captureScreenshot', { context })) as { data: string };
+      const { data } = (await command('browsingContext.captureScreenshot', { context })) as {
+        data: string;
+      };
       mkdirSync(artefacts, { recursive: true });
       writeFileSync(path.join(artefacts, `${name}.png`), Buffer.from(data, 'base64'));
     },
@@ -114,7 +137,15 @@ function launch(): Promise<string> {
   const profile = mkdtempSync(path.join(tmpdir(), 'catgs-firefox-'));
   const child = spawn(
     firefox_path,
-    ['--headless', '--no-remote', '--profile', profile, '--remote-debugging-port', '0', 'about:blank'],
+    [
+      '--headless',
+      '--no-remote',
+      '--profile',
+      profile,
+      '--remote-debugging-port',
+      '0',
+      'about:blank',
+    ],
     { stdio: ['ignore', 'ignore', 'pipe'] },
   );
   clean_up(async () => {
@@ -141,7 +172,8 @@ async function connect(address: string): Promise<Command> {
   socket.on('message', (data) => {
     const reply = JSON.parse((data as Buffer).toString()) as Reply;
     if (reply.id !== undefined) waiting.get(reply.id)?.(reply);
-    else if (reply.params?.level === 'error') errors_of.get(reply.params.source?.context)?.push(reply.params.text ?? '');
+    else if (reply.params?.level === 'error')
+      errors_of.get(reply.params.source?.context)?.push(reply.params.text ?? '');
   });
   let commands = 0;
   return (method, params) =>

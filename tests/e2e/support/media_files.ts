@@ -29,7 +29,9 @@ export async function painted_film(): Promise<Buffer> {
     canvas.width = 320;
     canvas.height = 180;
     const context = canvas.getContext('2d')!;
-    const recorder = new MediaRecorder(canvas.captureStream(10), { mimeType: 'video/webm;codecs=vp8' });
+    const recorder = new MediaRecorder(canvas.captureStream(10), {
+      mimeType: 'video/webm;codecs=vp8',
+    });
     const pieces: Blob[] = [];
     recorder.ondataavailable = ({ data }) => pieces.push(data);
     recorder.start();

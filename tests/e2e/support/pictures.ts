@@ -20,15 +20,18 @@ export const settled_picture = (page: Page): Promise<Picture> =>
 
 /** `page` may be any page: only its decoder is used. */
 export const read_png = (page: Page, file: string): Promise<Picture> =>
-  page.evaluate(async (png) => {
-    const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }), {
-      colorSpaceConversion: 'none',
-    });
-    const { width, height } = bitmap;
-    const context = new OffscreenCanvas(width, height).getContext('2d')!;
-    context.drawImage(bitmap, 0, 0);
-    return { width, height, rgba: context.getImageData(0, 0, width, height).data };
-  }, new Uint8Array(readFileSync(file)));
+  page.evaluate(
+    async (png) => {
+      const bitmap = await createImageBitmap(new Blob([png], { type: 'image/png' }), {
+        colorSpaceConversion: 'none',
+      });
+      const { width, height } = bitmap;
+      const context = new OffscreenCanvas(width, height).getContext('2d')!;
+      context.drawImage(bitmap, 0, 0);
+      return { width, height, rgba: context.getImageData(0, 0, width, height).data };
+    },
+    new Uint8Array(readFileSync(file)),
+  );
 
 /** PSNR over the RGB values of all pixels. */
 export function psnr_db(a: Picture, b: Picture): number {

@@ -13,7 +13,15 @@ const value = (picture: Picture, x: number, y: number): number =>
 const search_px = 24;
 
 /** Sum of squared differences of a block of `a` and the block of `b` that lies (dx, dy) from it. */
-function difference(a: Picture, b: Picture, x: number, y: number, side: number, dx: number, dy: number): number {
+function difference(
+  a: Picture,
+  b: Picture,
+  x: number,
+  y: number,
+  side: number,
+  dx: number,
+  dy: number,
+): number {
   let sum = 0;
   for (let row = y; row < y + side; row += 2) {
     for (let column = x; column < x + side; column += 2) {

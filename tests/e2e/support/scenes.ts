@@ -64,13 +64,31 @@ const properties = [
  * A trained-scene .ply with one flat, opaque, round spot per patch at distance `z`, of standard
  * deviation `sigma` (in units of the distance).
  */
-export function write_patches(file: string, patches: readonly Patch[], z: number, sigma: number): void {
+export function write_patches(
+  file: string,
+  patches: readonly Patch[],
+  z: number,
+  sigma: number,
+): void {
   const rows = patches.flatMap(({ rgb, x, y }) =>
     Array.from({ length: layers }, (_, layer) => {
       const depth = z + layer * 0.01;
       const dc = rgb.map((value) => (value / 255 - 0.5) / sh_c0);
       const scale = Math.log(sigma * z);
-      return [x * depth, y * depth, depth, ...dc, opacity_logit, scale, scale, Math.log(1e-3), 1, 0, 0, 0];
+      return [
+        x * depth,
+        y * depth,
+        depth,
+        ...dc,
+        opacity_logit,
+        scale,
+        scale,
+        Math.log(1e-3),
+        1,
+        0,
+        0,
+        0,
+      ];
     }),
   );
   const header = [
@@ -80,5 +98,8 @@ export function write_patches(file: string, patches: readonly Patch[], z: number
     ...properties.map((name) => `property float ${name}`),
     'end_header\n',
   ].join('\n');
-  writeFileSync(file, Buffer.concat([Buffer.from(header), Buffer.from(Float32Array.from(rows.flat()).buffer)]));
+  writeFileSync(
+    file,
+    Buffer.concat([Buffer.from(header), Buffer.from(Float32Array.from(rows.flat()).buffer)]),
+  );
 }

@@ -6,11 +6,15 @@ export function ask_server(
   { headers, ...request }: Omit<RequestInit, 'headers'> & { headers?: Record<string, string> } = {},
 ): Promise<Response> {
   const authorization: Record<string, string> = token ? { authorization: `Bearer ${token}` } : {};
-  return fetch(server_address(page_url, path), { ...request, headers: { ...headers, ...authorization } });
+  return fetch(server_address(page_url, path), {
+    ...request,
+    headers: { ...headers, ...authorization },
+  });
 }
 
 /** The address of `path` below /api/. */
-export const server_address = (page_url: string, path: string): URL => new URL(`./api/${path}`, page_url);
+export const server_address = (page_url: string, path: string): URL =>
+  new URL(`./api/${path}`, page_url);
 
 /** Path of something that belongs to a scene. */
 export const scene_path = (scene_id: string, what: string): string =>

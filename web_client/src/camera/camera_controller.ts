@@ -16,13 +16,13 @@ import { CameraRig, default_fov_y_rad } from './camera_rig';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
 import { FlyController } from './fly_controller';
-import type { Ground } from './ground';
 import type { CameraMode, ModeController } from './mode';
 import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import { OrbitController } from './orbit_controller';
 import type { SceneSetup } from './scene_setup';
 import { Smoothing } from './smoothing';
 import { WalkController } from './walk_controller';
+import type { Walker } from './walker';
 
 const steepest_rad = (88 * Math.PI) / 180; // at 90 degrees "up" has no direction in the image
 const turn_rad_per_s = 1.2;
@@ -97,9 +97,9 @@ export class CameraController {
     this.rig_.fov_y_rad = value;
   }
 
-  /** On which visitors walk; undefined: not known, or there is none. */
-  set ground(ground: Ground | undefined) {
-    this.walk_.ground = ground;
+  /** Who walks on the walkable area; undefined: it is not known, or there is none. */
+  set walker(walker: Walker | undefined) {
+    this.walk_.walker = walker;
   }
 
   load(scene: SceneSetup): void {
@@ -152,7 +152,7 @@ export class CameraController {
     this.rig_.unlimited = unlimited;
   }
 
-  /** The place nearest to this one that the scene's limits allow. */
+  /** The point nearest to this one that the scene's limits allow. */
   within(position: Vec3): Vec3 {
     return this.rig_.within(position);
   }
@@ -182,7 +182,12 @@ export class CameraController {
   /** Flies to where the mode begins, if that is elsewhere. */
   begin_mode(at_once = false): void {
     const to = this.controller.begin();
-    if (to) this.fly_to(to, add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())), at_once);
+    if (to)
+      this.fly_to(
+        to,
+        add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())),
+        at_once,
+      );
   }
 
   /** Turns the scene in the picture, for captures that lie on their side or stand on their head. */
@@ -249,7 +254,11 @@ export class CameraController {
     const { up } = this.rig_;
     const { position, orientation } = this.scene_.start_pose;
     const ahead = add(position, rotate(orientation, forward));
-    this.scene_ = { ...this.scene_, up, start_pose: { position, orientation: look_at(position, ahead, up) } };
+    this.scene_ = {
+      ...this.scene_,
+      up,
+      start_pose: { position, orientation: look_at(position, ahead, up) },
+    };
   }
 
   private follow_flight(dt_s: number): boolean {

@@ -86,11 +86,13 @@ export class CameraRig {
   }
 
   contains(p: Vec3): boolean {
-    return this.unlimited || p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9);
+    return (
+      this.unlimited || p.every((v, i) => v >= this.min_[i]! - 1e-9 && v <= this.max_[i]! + 1e-9)
+    );
   }
 
   /** Removes the part along up. */
-  on_ground(v: Vec3): Vec3 {
+  level_part(v: Vec3): Vec3 {
     return sub(v, scale(this.up, dot(v, this.up)));
   }
 
@@ -104,7 +106,7 @@ export class CameraRig {
     this.pose = { ...this.pose, position };
   }
 
-  /** Moves camera and focus together to a place that the limits do not bind. */
+  /** Moves camera and focus together to a point that the limits do not bind. */
   put(position: Vec3): void {
     this.focus = add(this.focus, sub(position, this.pose.position));
     this.pose = { ...this.pose, position };

@@ -17,8 +17,13 @@ export interface PathSample {
 const announced_samples = 64;
 const held_us = 1_000_000; // at the end of a flight the camera stays
 
-/** The part of a flight that begins now, at `from_s`, as the server is told of it. */
-export function path_of(way: Flight, from_s: number, length_s: number, now_us: number): PathSample[] {
+/** The part of a flight that begins now, at `from_s`, as the server hears of it. */
+export function path_of(
+  way: Flight,
+  from_s: number,
+  length_s: number,
+  now_us: number,
+): PathSample[] {
   const samples = Array.from({ length: announced_samples + 1 }, (_, i): PathSample => {
     const offset_s = (length_s * i) / announced_samples;
     return { time_us: now_us + offset_s * 1e6, eye: way.at(from_s + offset_s) };
@@ -58,7 +63,8 @@ const pursuit_s = 5 * catch_up_s;
 export function pursuit(from: Eye, to: Eye): Flight {
   return {
     duration_s: pursuit_s,
-    at: (time_s) => (time_s >= pursuit_s ? to : between(from, to, 1 - Math.exp(-time_s / catch_up_s))),
+    at: (time_s) =>
+      time_s >= pursuit_s ? to : between(from, to, 1 - Math.exp(-time_s / catch_up_s)),
   };
 }
 

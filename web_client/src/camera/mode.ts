@@ -19,10 +19,10 @@ export interface ModeController {
   turn(by: Quat): void;
   /** Moves the camera as far as the mode allows. `climb`: along up. World axes and units. */
   move(movement: Vec3, climb: number): void;
-  /** Called after each step of the camera; false: it goes on without the visitor. */
+  /** Called after each step of the camera; false: it continues without the visitor. */
   settle?(dt_s: number): boolean;
   /** `steps`: notches of a wheel, > 0 towards the scene. */
   dolly(steps: number): void;
-  /** Where the camera goes when the visitor points at a place. */
+  /** Where the camera goes when the visitor points at something. */
   approach(point: Vec3): Eye;
 }

@@ -9,12 +9,22 @@ export type Gesture =
 const directions = ['right', 'up', 'forward', 'turn_right', 'turn_up'] as const;
 
 /** Held keys and deflected sticks, each -1…1. */
-export type Axes = Readonly<Record<(typeof directions)[number], number>> & { readonly fast: boolean };
+export type Axes = Readonly<Record<(typeof directions)[number], number>> & {
+  readonly fast: boolean;
+};
 
-export const no_axes: Axes = { right: 0, up: 0, forward: 0, turn_right: 0, turn_up: 0, fast: false };
+export const no_axes: Axes = {
+  right: 0,
+  up: 0,
+  forward: 0,
+  turn_right: 0,
+  turn_up: 0,
+  fast: false,
+};
 
 /** Whether a key or a stick moves the camera. */
-export const is_held = (axes: Axes): boolean => directions.some((direction) => axes[direction] !== 0);
+export const is_held = (axes: Axes): boolean =>
+  directions.some((direction) => axes[direction] !== 0);
 
 /** All of these keys and sticks together. */
 export function sum_of(...held: readonly Partial<Axes>[]): Axes {

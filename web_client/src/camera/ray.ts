@@ -1,5 +1,17 @@
-// Converts between places in the view and rays in the scene. Pure.
-import { add, conjugate, cross, dot, forward, length, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
+// Converts between points of the view and rays in the scene. Pure.
+import {
+  add,
+  conjugate,
+  cross,
+  dot,
+  forward,
+  length,
+  normalize,
+  rotate,
+  scale,
+  sub,
+  type Vec3,
+} from '../base/vector';
 import type { Eye } from './eye';
 
 export interface Ray {
@@ -7,7 +19,7 @@ export interface Ray {
   readonly direction: Vec3;
 }
 
-/** Ray through a place of the view. `x`, `y`: shares of its width and height, y down. */
+/** Ray through a point of the view. `x`, `y`: shares of its width and height, y down. */
 export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray {
   const tan = Math.tan(eye.fov_y_rad / 2);
   const inside = normalize([(2 * x - 1) * tan * aspect, (2 * y - 1) * tan, 1], forward);
@@ -15,7 +27,11 @@ export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray
 }
 
 /** Place of a point of the scene in the view, as in ray_through(); undefined behind the camera. */
-export function place_of(point: Vec3, eye: Eye, aspect: number): readonly [number, number] | undefined {
+export function project(
+  point: Vec3,
+  eye: Eye,
+  aspect: number,
+): readonly [number, number] | undefined {
   const [x, y, z] = rotate(conjugate(eye.orientation), sub(point, eye.position));
   if (z <= 1e-6) return undefined;
   const tan = Math.tan(eye.fov_y_rad / 2);

@@ -1,92 +1,97 @@
 import { add, dot, length, look_at, normalize, same, scale, sub, type Vec3 } from '../base/vector';
 import type { Eye } from './eye';
 import { FlyController } from './fly_controller';
-import type { Ground } from './ground';
+import type { Walker } from './walker';
 
 const step_before = 0.1; // of the scene's scale: a visitor stands before what they pointed at
 const eye_heights_per_s = 1.1;
 const eye_heights_per_notch = 0.5;
 const settles_in_s = 0.12; // a stair of 0.17 m is no jump then, and the eyes are not late by much
 const settled_share = 1e-3; // of the eye height
-const steepest_sine = 0.35; // of a view that comes down to the ground
+const steepest_sine = 0.35; // of a view that comes down to the floor
 
 /**
- * The camera looks around as in flight. On the ground of the scene, where that is known, it stays at eye
+ * The camera looks around as in flight. On the walkable area, where that is known, it stays at eye
  * height and passes no wall; else it keeps its height.
  */
 export class WalkController extends FlyController {
-  private ground_: Ground | undefined;
-  private eyes_: Vec3 | undefined; // of the walker on the ground
+  private walker_: Walker | undefined;
+  private eyes_: Vec3 | undefined; // of the walker
   private put_: Vec3 | undefined; // where the camera was left. Elsewhere, it has been moved meanwhile
   private away_: Vec3 = [0, 0, 0]; // of the camera from the walker's eyes
 
-  get ground(): Ground | undefined {
-    return this.ground_;
+  get walker(): Walker | undefined {
+    return this.walker_;
   }
 
-  set ground(ground: Ground | undefined) {
-    this.ground_ = ground;
+  set walker(walker: Walker | undefined) {
+    this.walker_ = walker;
     this.eyes_ = this.put_ = undefined;
   }
 
   override get speed(): number {
-    return this.ground_ ? (eye_heights_per_s * this.ground_.eye_height) / this.rig.reach : 0.25;
+    return this.walker_ ? (eye_heights_per_s * this.walker_.eye_height) / this.rig.reach : 0.25;
   }
 
   override get heading(): Vec3 {
     const { view } = this.rig;
-    return normalize(this.rig.on_ground(view), view);
+    return normalize(this.rig.level_part(view), view);
   }
 
-  /** Comes down to the ground, and looks about level. */
+  /** Comes down to the floor, and looks about level. */
   override begin(): Eye | undefined {
     const { rig } = this;
-    const position = this.ground_?.stand_near(rig.pose.position);
+    const position = this.walker_?.stand_near(rig.pose.position);
     if (!position) return undefined;
     const rise = Math.min(Math.max(dot(rig.view, rig.up), -steepest_sine), steepest_sine);
     const ahead = add(scale(this.heading, Math.sqrt(1 - rise * rise)), scale(rig.up, rise));
-    return { position, orientation: look_at(position, add(position, ahead), rig.up), fov_y_rad: rig.fov_y_rad };
+    return {
+      position,
+      orientation: look_at(position, add(position, ahead), rig.up),
+      fov_y_rad: rig.fov_y_rad,
+    };
   }
 
   override move(movement: Vec3, climb: number): void {
-    const way = this.rig.on_ground(movement);
-    const { ground_: ground } = this;
-    if (!ground) return super.move(way, climb);
+    const way = this.rig.level_part(movement);
+    const { walker_: walker } = this;
+    if (!walker) return super.move(way, climb);
     if (length(way) === 0) return;
     const { position } = this.rig.pose;
     if (!this.put_ || !same(this.put_, position)) {
-      this.eyes_ = ground.stand_near(position);
+      this.eyes_ = walker.stand_near(position);
       this.away_ = this.eyes_ ? sub(position, this.eyes_) : [0, 0, 0];
     }
     if (!this.eyes_) return super.move(way, climb);
     if (this.rig.contains(position) && !this.rig.contains(add(position, way))) return;
     const before = this.eyes_;
-    this.eyes_ = ground.walk(way);
-    // The eyes follow the ground up and down a little later.
+    this.eyes_ = walker.walk(way);
+    // The eyes follow the floor up and down a little later.
     const rise = dot(sub(this.eyes_, before), this.rig.up);
     this.away_ = sub(this.away_, scale(this.rig.up, rise));
     this.put();
   }
 
   settle(dt_s: number): boolean {
-    if (!this.eyes_ || !this.put_ || !this.ground_ || length(this.away_) === 0) return true;
+    if (!this.eyes_ || !this.put_ || !this.walker_ || length(this.away_) === 0) return true;
     if (!same(this.put_, this.rig.pose.position)) return true;
     this.away_ = scale(this.away_, Math.exp(-dt_s / settles_in_s));
-    if (length(this.away_) < settled_share * this.ground_.eye_height) this.away_ = [0, 0, 0];
+    if (length(this.away_) < settled_share * this.walker_.eye_height) this.away_ = [0, 0, 0];
     this.put();
     return length(this.away_) === 0;
   }
 
   override dolly(steps: number): void {
-    const { ground_: ground } = this;
-    if (ground) this.move(scale(this.heading, steps * eye_heights_per_notch * ground.eye_height), 0);
+    const { walker_: walker } = this;
+    if (walker)
+      this.move(scale(this.heading, steps * eye_heights_per_notch * walker.eye_height), 0);
     else super.dolly(steps);
   }
 
   /** Stops a step before the point, at the present height, and faces it. */
   override approach(point: Vec3): Eye {
     const { rig } = this;
-    const way = rig.on_ground(sub(point, rig.pose.position));
+    const way = rig.level_part(sub(point, rig.pose.position));
     const distance = Math.max(length(way), 1e-9);
     const gone = Math.max(0, distance - step_before * rig.reach);
     const position = rig.within(add(rig.pose.position, scale(way, gone / distance)));

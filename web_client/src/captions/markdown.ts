@@ -47,7 +47,9 @@ function pieces_of_node(node: Nodes, depth: number): readonly Piece[] {
       return [{ tag: 'strong', pieces: inside(node, depth) }];
     case 'link': {
       const href = link_of(node.url);
-      return href === undefined ? inside(node, depth) : [{ tag: 'a', href, pieces: inside(node, depth) }];
+      return href === undefined
+        ? inside(node, depth)
+        : [{ tag: 'a', href, pieces: inside(node, depth) }];
     }
     default:
       return [words_of(node)];

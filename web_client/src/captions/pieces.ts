@@ -1,11 +1,30 @@
 // What a caption may be made of. Pure.
 
-type Tag = 'p' | 'h3' | 'h4' | 'ul' | 'ol' | 'li' | 'blockquote' | 'pre' | 'code' | 'hr' | 'em' | 'strong' | 'br' | 'a';
+type Tag =
+  | 'p'
+  | 'h3'
+  | 'h4'
+  | 'ul'
+  | 'ol'
+  | 'li'
+  | 'blockquote'
+  | 'pre'
+  | 'code'
+  | 'hr'
+  | 'em'
+  | 'strong'
+  | 'br'
+  | 'a';
 
 /** A text, or an element. `href`: only of 'a'; see link_of(). */
 export type Piece =
   | string
-  | { readonly tag: Tag; readonly pieces: readonly Piece[]; readonly href?: string; readonly start?: number };
+  | {
+      readonly tag: Tag;
+      readonly pieces: readonly Piece[];
+      readonly href?: string;
+      readonly start?: number;
+    };
 
 /** Whether a caption may say more as Markdown than as it is written. */
 export const may_be_markdown = (caption: string): boolean =>

@@ -10,7 +10,7 @@ interface Remembered {
   readonly until_ms: number;
 }
 
-/** The rung to begin with: the top one, unless decoders of this browser failed lately. */
+/** The rung to begin with: the top one, unless decoders of this browser failed recently. */
 export function remembered_rung(
   storage: Storage | undefined,
   agent: string,

@@ -1,14 +1,18 @@
 // Orders pictures and films from the server, which draws them for authors.
 import { ask_server, scene_path } from '../base/server';
 
-export interface FilmWish {
+export interface FilmRequest {
   readonly kind: 'picture' | 'panorama' | 'film';
   readonly size: readonly [number, number];
   readonly views: readonly (readonly number[] | number)[];
 }
 
 /** How the file's name ends, after that of the scene. A picture and a panorama of a scene may lie in one folder. */
-export const film_endings: Readonly<Record<FilmWish['kind'], string>> = { picture: '.png', panorama: '-360.png', film: '.mp4' };
+export const film_endings: Readonly<Record<FilmRequest['kind'], string>> = {
+  picture: '.png',
+  panorama: '-360.png',
+  film: '.mp4',
+};
 
 export interface FilmState {
   readonly state: 'waiting' | 'drawing' | 'done' | 'failed' | 'cancelled';
@@ -22,10 +26,10 @@ export async function order_film(
   page_url: string,
   token: string,
   scene_id: string,
-  wish: FilmWish,
+  film: FilmRequest,
 ): Promise<{ readonly id: string } | { readonly why: string }> {
   try {
-    const request = { method: 'PUT', body: JSON.stringify(wish) };
+    const request = { method: 'PUT', body: JSON.stringify(film) };
     const response = await ask_server(page_url, token, scene_path(scene_id, 'films'), request);
     if (response.ok) return (await response.json()) as { id: string };
     const [line = ''] = (await response.text()).split('\n');
@@ -46,8 +50,11 @@ export async function film_state(page_url: string, id: string): Promise<FilmStat
   }
 }
 
-export const film_address = (page_url: string, id: string): string => new URL(`./api/films/${id}/file`, page_url).href;
+export const film_address = (page_url: string, id: string): string =>
+  new URL(`./api/films/${id}/file`, page_url).href;
 
 export async function cancel_film(page_url: string, id: string): Promise<void> {
-  await ask_server(page_url, '', `films/${id}/cancel`, { method: 'PUT', body: '{}' }).catch(() => undefined);
+  await ask_server(page_url, '', `films/${id}/cancel`, { method: 'PUT', body: '{}' }).catch(
+    () => undefined,
+  );
 }

@@ -56,7 +56,9 @@ export function write_views(eyes: readonly Eye[]): (readonly number[] | number)[
 export const write_tum = (eyes: readonly Eye[]): string =>
   eyes
     .map(({ position, orientation }, i) =>
-      [(i / film_fps).toFixed(6), ...[...position, ...orientation].map((v) => v.toFixed(7))].join(' '),
+      [(i / film_fps).toFixed(6), ...[...position, ...orientation].map((v) => v.toFixed(7))].join(
+        ' ',
+      ),
     )
     .join('\n')
     .concat('\n');

@@ -1,3 +1,4 @@
+import type { Timers } from '../base/clock';
 import type { Gesture } from '../camera/movement';
 
 /** The part of PointerEvent that matters here. Pixels of the view, y down. */
@@ -8,6 +9,16 @@ export interface PointerSample {
   y: number;
   buttons: number;
   shift: boolean;
+}
+
+/**
+ * A click, a tap, the second of two, or a press: a long one, or Alt and a click. `x`, `y`: shares of the view's
+ * width and height, y down.
+ */
+export interface Pointed {
+  readonly x: number;
+  readonly y: number;
+  readonly how: 'click' | 'touch' | 'double tap' | 'press';
 }
 
 interface Held {
@@ -100,12 +111,46 @@ export class Taps {
   }
 }
 
+const long_press_ms = 600;
+
+/** Tells a long press from taps and drags. */
+export class LongPress {
+  private pressed_:
+    | { readonly x: number; readonly y: number; readonly cancel: () => void }
+    | undefined;
+
+  constructor(private readonly timers_: Timers) {}
+
+  /** A pointer is down. Calls `pressed` if it stays there for long. */
+  begin(x: number, y: number, pressed: () => void): void {
+    this.end();
+    const cancel = this.timers_.after(long_press_ms, () => {
+      this.pressed_ = undefined;
+      pressed();
+    });
+    this.pressed_ = { x, y, cancel };
+  }
+
+  /** The pointer is here. Returns whether a long press may still come; a drag ends it. */
+  may_come(x: number, y: number): boolean {
+    if (this.pressed_ && Math.hypot(x - this.pressed_.x, y - this.pressed_.y) > tap_slack_px)
+      this.end();
+    return this.pressed_ !== undefined;
+  }
+
+  end(): void {
+    this.pressed_?.cancel();
+    this.pressed_ = undefined;
+  }
+}
+
 /**
  * Notches towards the scene. `delta_mode` is that of WheelEvent. A pinch on a trackpad comes as a wheel
  * with ctrl and small deltas.
  */
 export function wheel_steps(delta_y: number, delta_mode: number, ctrl: boolean): number {
-  const px_per_unit = delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
+  const px_per_unit =
+    delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
   const steps = (-delta_y * px_per_unit * (ctrl ? 8 : 1)) / wheel_px_per_step;
   return Math.min(8, Math.max(-8, steps));
 }

@@ -1,8 +1,16 @@
 // Turns DOM events of the view into gestures and held keys.
+import { browser_timers } from '../base/clock';
 import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
 import { HeldKeys } from './keyboard';
-import { Pointers, Taps, wheel_steps, type PointerSample } from './pointers';
+import {
+  LongPress,
+  Pointers,
+  Taps,
+  wheel_steps,
+  type Pointed,
+  type PointerSample,
+} from './pointers';
 
 interface ViewInputListener {
   gesture(gesture: Gesture): void;
@@ -11,11 +19,9 @@ interface ViewInputListener {
   keys_changed(): void;
   /** No pointer is down any more, and nothing glides on. */
   let_go(): void;
-  /**
-   * The second of two clicks or taps, or a single one: by a finger, or by a mouse or pen. `x`, `y`: shares of
-   * the view's width and height, y down.
-   */
-  pointed_at(x: number, y: number, how: 'double tap' | 'touch' | 'click'): void;
+  /** Whether somebody hears presses. Otherwise they are drags and clicks. */
+  wants_presses(): boolean;
+  pointed(pointed: Pointed): void;
 }
 
 export function bind_view_input(
@@ -38,7 +44,24 @@ function bind_pointers(
   listener: ViewInputListener,
 ): void {
   const taps = new Taps();
+  const press = new LongPress(browser_timers);
+  /** Shares of the view's width and height. */
+  const project = ({ clientX, clientY }: PointerEvent): Pick<Pointed, 'x' | 'y'> => {
+    const { left, top, width, height } = view.getBoundingClientRect();
+    return { x: (clientX - left) / width, y: (clientY - top) / height };
+  };
   view.addEventListener('pointerdown', (event) => {
+    press.end();
+    if (listener.wants_presses() && event.isPrimary && event.button === 0) {
+      const pressed = (): void => listener.pointed({ ...project(event), how: 'press' });
+      if (event.altKey) return pressed();
+      press.begin(event.clientX, event.clientY, () => {
+        if (!listener.wants_presses()) return;
+        taps.cancel(); // for the camera it is over
+        if (pointers.up(event.pointerId)) listener.let_go();
+        pressed();
+      });
+    }
     if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
     view.setPointerCapture(event.pointerId);
     inertia.stop();
@@ -46,6 +69,8 @@ function bind_pointers(
     taps.down(event.clientX, event.clientY, pointers.count === 1 && event.button === 0);
   });
   view.addEventListener('pointermove', (event) => {
+    // Until it is a drag, the camera hears nothing of it: a participant's would leave the host.
+    if (press.may_come(event.clientX, event.clientY)) return;
     for (const gesture of pointers.move(sample_of(event), view.clientHeight)) {
       inertia.moved(gesture, event.timeStamp);
       listener.gesture(gesture);
@@ -53,16 +78,14 @@ function bind_pointers(
   });
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
     view.addEventListener(end, (event) => {
+      press.end();
       const lifted = pointers.up(event.pointerId);
       if (end === 'pointercancel') taps.cancel();
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
-        if (what !== 'drag') {
-          const { left, top, width, height } = view.getBoundingClientRect();
-          const [x, y] = [(event.clientX - left) / width, (event.clientY - top) / height];
-          const single = event.pointerType === 'touch' ? 'touch' : 'click';
-          listener.pointed_at(x, y, what === 'tap' ? single : what);
-        }
+        const single = event.pointerType === 'touch' ? 'touch' : 'click';
+        if (what !== 'drag')
+          listener.pointed({ ...project(event), how: what === 'tap' ? single : what });
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();

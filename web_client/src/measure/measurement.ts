@@ -1,7 +1,7 @@
-// Lengths, heights and areas between places of the scene, with their errors. Pure.
+// Lengths, heights and areas between points of the scene, with their errors. Pure.
 import { add, cross, dot, length, normalize, scale, sub, type Vec3 } from '../base/vector';
 
-/** A place that the visitor has marked. Standard deviations are in world units. */
+/** A point that the visitor has marked. Standard deviations are in world units. */
 export interface Mark {
   readonly point: Vec3;
   /** Of the ray that found it; unit. */
@@ -36,14 +36,20 @@ export function length_of(marks: readonly Mark[]): Measured {
   const ways = marks.slice(1).map(({ point }, i) => sub(point, marks[i]!.point));
   const along = ways.map((way) => normalize(way, none));
   const gradients = marks.map((_, i) => sub(along[i - 1] ?? none, along[i] ?? none));
-  return { value: ways.reduce((sum, way) => sum + length(way), 0), error: error_of(marks, gradients) };
+  return {
+    value: ways.reduce((sum, way) => sum + length(way), 0),
+    error: error_of(marks, gradients),
+  };
 }
 
 /** How far the last mark is above the first one. `up`: unit. */
 export function rise_of(marks: readonly Mark[], up: Vec3): Measured {
   const [first, last] = [marks[0], marks[marks.length - 1]];
   if (!first || !last) return { value: 0, error: 0 };
-  return { value: dot(sub(last.point, first.point), up), error: error_of([first, last], [scale(up, -1), up]) };
+  return {
+    value: dot(sub(last.point, first.point), up),
+    error: error_of([first, last], [scale(up, -1), up]),
+  };
 }
 
 /** Area of the polygon whose corners are the marks. Of one that is not flat, it is the largest projection. */

@@ -1,6 +1,6 @@
 // Lengths and areas as visitors write them.
-import { locale } from '../text/text';
 import { number } from '../text/number';
+import { locale } from '../text/text';
 import type { Measured } from './measurement';
 
 export const systems = ['metric', 'imperial'] as const;
@@ -11,7 +11,9 @@ export const usual_system = (of_locale: string): System =>
   /-(US|LR|MM)\b/.test(of_locale) ? 'imperial' : 'metric';
 
 /** Units of a system, the smallest first, and how long they are in metres. */
-const units: Readonly<Record<System, readonly { readonly sign: string; readonly metres: number }[]>> = {
+const units: Readonly<
+  Record<System, readonly { readonly sign: string; readonly metres: number }[]>
+> = {
   metric: [
     { sign: 'cm', metres: 0.01 },
     { sign: 'm', metres: 1 },
@@ -41,7 +43,10 @@ export function written({ value, error }: Measured, scale: Scale, power: 1 | 2 =
     : { sign: '', metres: 1 };
   const factor = metres / unit.metres ** power;
   const sign = unit.sign && `\u00a0${unit.sign}${power === 2 ? '²' : ''}`;
-  const digits = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(Math.max(error * factor, 1e-6)))));
+  const digits = Math.min(
+    6,
+    Math.max(0, 1 - Math.floor(Math.log10(Math.max(error * factor, 1e-6)))),
+  );
   const text = (amount: number): string =>
     `${number(amount * factor, { minimumFractionDigits: digits, maximumFractionDigits: digits }).replace('-', '−')}${sign}`;
   return `${text(value)} ± ${text(error)}`;

@@ -1,14 +1,14 @@
 import { ask_server, scene_path, server_address } from '../base/server';
 import { is_foreign } from '../tour/media';
 
-const renew_after_ms = 3600_000; // the server's passes are good for four hours
+const renew_after_ms = 3600_000; // the server's signatures are valid for four hours
 
 /**
- * Where the media of a scene are. Elements of a page cannot send a token, so visitors who have one get a
- * pass, which goes into the addresses.
+ * Where the media of a scene are. Elements of a page cannot send a token, so visitors who have one get
+ * signed addresses.
  */
 export class MediaAddresses {
-  private pass_: { readonly text: Promise<string>; readonly made_ms: number } | undefined;
+  private signature_: { readonly text: Promise<string>; readonly made_ms: number } | undefined;
 
   constructor(
     private readonly page_url_: string,
@@ -18,27 +18,34 @@ export class MediaAddresses {
 
   async of(src: string): Promise<string> {
     if (is_foreign(src)) return src;
-    const address = server_address(this.page_url_, scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`));
-    if (this.token_) address.searchParams.set('pass', await this.pass());
+    const address = server_address(
+      this.page_url_,
+      scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`),
+    );
+    if (this.token_) address.searchParams.set('pass', await this.signature());
     return address.href;
   }
 
-  private pass(): Promise<string> {
-    if (!this.pass_ || Date.now() - this.pass_.made_ms > renew_after_ms) {
-      this.pass_ = { text: this.ask(), made_ms: Date.now() };
+  private signature(): Promise<string> {
+    if (!this.signature_ || Date.now() - this.signature_.made_ms > renew_after_ms) {
+      this.signature_ = { text: this.ask(), made_ms: Date.now() };
     }
-    return this.pass_.text;
+    return this.signature_.text;
   }
 
-  /** Without a pass the server refuses, and the page says that a medium cannot be shown. */
+  /** Without a signature the server refuses, and the page says that a medium cannot be shown. */
   private async ask(): Promise<string> {
     try {
-      const response = await ask_server(this.page_url_, this.token_, scene_path(this.scene_id_, 'media-pass'));
+      const response = await ask_server(
+        this.page_url_,
+        this.token_,
+        scene_path(this.scene_id_, 'media-pass'),
+      );
       if (response.ok) return await response.text();
     } catch (error) {
       console.warn('the media of the scene cannot be had', error);
     }
-    this.pass_ = undefined;
+    this.signature_ = undefined;
     return '';
   }
 }

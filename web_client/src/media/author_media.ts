@@ -1,16 +1,22 @@
 // The author's fields for pictures, films, voices and sounds.
-import { number } from '../text/number';
+import type { MediaFields } from '../author/stops';
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import { max_media, max_text_characters } from '../tour/limits';
-import { accepted, kind_of, media_kinds, usual_volume, type MediaKind, type Medium } from '../tour/media';
+import {
+  accepted,
+  kind_of,
+  media_kinds,
+  usual_volume,
+  type MediaKind,
+  type Medium,
+} from '../tour/media';
 import type { Stop, Tour } from '../tour/tour';
-import type { MediaFields } from '../ui/author_stops';
-import { by_id, make } from '../ui/dom';
-import { MediaShelf } from './shelf';
+import { MediaFolder } from './media_folder';
 
 interface Choice {
   readonly label: string;
-  readonly control: string; // by which the focus finds it again (author_stops.ts)
+  readonly control: string; // by which the focus finds it again (author/stops.ts)
   readonly kinds: readonly (MediaKind | 'captions')[];
   /** The file that is chosen; '': none. */
   readonly value: string;
@@ -21,67 +27,148 @@ interface Choice {
 type SetMedium = (i: number, change: (medium: Medium) => Partial<Medium>, field?: string) => void;
 
 export class AuthorMedia implements MediaFields {
-  private shelf_: MediaShelf | undefined;
+  private folder_: MediaFolder | undefined;
   private readonly open_ = new Set<string>(); // summaries whose fields are shown
   private looked_: Promise<void> | undefined; // what is there is known
 
   use(scene_id: string, token: string | undefined): void {
-    this.shelf_ = token === undefined ? undefined : new MediaShelf(scene_id, token);
-    this.looked_ = this.shelf_?.look();
+    this.folder_ = token === undefined ? undefined : new MediaFolder(scene_id, token);
+    this.looked_ = this.folder_?.look();
   }
 
-  of_stop(stop: () => Stop, n: string, language: string, change: (change: Partial<Stop>, field?: string) => void): HTMLElement {
+  of_stop(
+    stop: () => Stop,
+    n: string,
+    language: string,
+    change: (change: Partial<Stop>, field?: string) => void,
+  ): HTMLElement {
     const media = stop().media ?? [];
     const words = text.media;
     // Typing in one field rebuilds no other, so what is there now is asked for.
     const set: SetMedium = (i, changed, field) =>
-      change({ media: (stop().media ?? []).map((medium, j) => (j === i ? { ...medium, ...changed(medium) } : medium)) }, field);
-    const rows = media.map((medium, i) => {
-      const drop = make('button', { type: 'button', 'aria-label': words.remove(medium.src), title: words.remove(medium.src) }, '×');
-      drop.addEventListener('click', () => change({ media: (stop().media ?? []).filter((_, j) => j !== i) }));
-      const name = make('div', { className: 'medium' }, make('span', { dir: 'ltr' }, medium.src), drop);
-      const row = make('section', {}, name, this.alt_of(medium, i, language, set));
-      if (medium.kind !== 'image') row.append(this.captions_of(medium.captions, medium.src, (captions) => set(i, () => ({ captions }))));
-      return row;
+      change(
+        {
+          media: (stop().media ?? []).map((medium, j) =>
+            j === i ? { ...medium, ...changed(medium) } : medium,
+          ),
+        },
+        field,
+      );
+    const without = (i: number): Partial<Stop> => ({
+      media: (stop().media ?? []).filter((_, j) => j !== i),
     });
+    const rows = media.map((medium, i) =>
+      this.row_of(medium, i, language, set, () => change(without(i))),
+    );
     const { narration } = stop();
     const voice = this.choice({
-      ...{ label: words.narration, control: 'voice', kinds: ['audio'], value: narration?.src ?? '', none: words.none },
-      chosen: (src) => change({ narration: src ? { src, captions: narration?.captions ?? '' } : undefined }),
+      label: words.narration,
+      control: 'voice',
+      kinds: ['audio'],
+      value: narration?.src ?? '',
+      none: words.none,
+      chosen: (src) =>
+        change({ narration: src ? { src, captions: narration?.captions ?? '' } : undefined }),
     });
     const add = this.choice({
-      ...{ label: words.add, control: 'medium', kinds: media_kinds, value: '', none: words.choose },
+      label: words.add,
+      control: 'medium',
+      kinds: media_kinds,
+      value: '',
+      none: words.choose,
       chosen: (src) => {
         const kind = kind_of(src);
         if (kind === undefined || kind === 'captions') return;
-        change({ media: [...(stop().media ?? []), { src, kind, alt: '', alt_in: new Map(), language: '', captions: '' }] });
+        change({
+          media: [
+            ...(stop().media ?? []),
+            { src, kind, alt: '', alt_in: new Map(), language: '', captions: '' },
+          ],
+        });
       },
     });
     const parts = [...rows, ...(media.length < max_media ? [add] : []), voice];
-    if (narration) parts.push(this.captions_of(narration.captions, narration.src, (captions) => change({ narration: { ...narration, captions } })));
+    if (narration)
+      parts.push(
+        this.captions_of(narration.captions, narration.src, (captions) =>
+          change({ narration: { ...narration, captions } }),
+        ),
+      );
     const count = media.length + (narration ? 1 : 0);
-    return this.details(`stop ${n}`, count > 0 ? words.of_stop_count(number(count)) : words.of_stop, parts);
+    return this.details(
+      `stop ${n}`,
+      count > 0 ? words.of_stop_count({ count }) : words.of_stop,
+      parts,
+    );
   }
 
   of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement {
     const words = text.media;
     const { sound } = tour;
     const choice = this.choice({
-      ...{ label: words.sound, control: 'sound', kinds: ['audio'], value: sound?.src ?? '', none: words.none },
-      chosen: (src) => change({ sound: src ? { src, volume: sound?.volume ?? usual_volume } : undefined }),
+      label: words.sound,
+      control: 'sound',
+      kinds: ['audio'],
+      value: sound?.src ?? '',
+      none: words.none,
+      chosen: (src) =>
+        change({ sound: src ? { src, volume: sound?.volume ?? usual_volume } : undefined }),
     });
     if (!sound) return choice;
-    const volume = make('input', { type: 'range', min: '0.05', max: '1', step: '0.05', value: String(sound.volume) });
-    volume.addEventListener('input', () => change({ sound: { ...sound, volume: Number(volume.value) } }, 'volume'));
-    return make('div', { className: 'media-fields' }, choice, make('label', {}, words.volume, volume));
+    const volume = make('input', {
+      type: 'range',
+      min: '0.05',
+      max: '1',
+      step: '0.05',
+      value: String(sound.volume),
+    });
+    volume.addEventListener('input', () =>
+      change({ sound: { ...sound, volume: Number(volume.value) } }, 'volume'),
+    );
+    return make(
+      'div',
+      { className: 'media-fields' },
+      choice,
+      make('label', {}, words.volume, volume),
+    );
+  }
+
+  private row_of(
+    medium: Medium,
+    i: number,
+    language: string,
+    set: SetMedium,
+    remove: () => void,
+  ): HTMLElement {
+    const label = text.media.remove({ name: medium.src });
+    const button = make(
+      'button',
+      { type: 'button', 'aria-label': label, title: label, onclick: remove },
+      '×',
+    );
+    const name = make(
+      'div',
+      { className: 'medium' },
+      make('span', { dir: 'ltr' }, medium.src),
+      button,
+    );
+    const row = make('section', {}, name, this.alt_of(medium, i, language, set));
+    const set_captions = (captions: string): void => set(i, () => ({ captions }));
+    if (medium.kind !== 'image')
+      row.append(this.captions_of(medium.captions, medium.src, set_captions));
+    return row;
   }
 
   private alt_of(medium: Medium, i: number, language: string, set: SetMedium): HTMLElement {
     const own = language === '';
     const alt = make('input', {
-      ...{ value: own ? medium.alt : (medium.alt_in.get(language) ?? ''), maxLength: max_text_characters, dir: 'auto', lang: language },
-      ...{ placeholder: own ? text.media.alt_hint : medium.alt, required: own && medium.kind === 'image' },
-      'aria-label': text.media.alt(medium.src),
+      value: own ? medium.alt : (medium.alt_in.get(language) ?? ''),
+      maxLength: max_text_characters,
+      dir: 'auto',
+      lang: language,
+      placeholder: own ? text.media.alt_hint : medium.alt,
+      required: own && medium.kind === 'image',
+      'aria-label': text.media.alt({ name: medium.src }),
     });
     alt.dataset['control'] = `alt ${i}`;
     alt.addEventListener('input', () => {
@@ -95,12 +182,22 @@ export class AuthorMedia implements MediaFields {
 
   private captions_of(value: string, src: string, chosen: (name: string) => void): HTMLElement {
     return this.choice({
-      ...{ label: text.media.captions_of(src), control: `captions ${src}`, kinds: ['captions'], value, none: text.media.none, chosen },
+      label: text.media.captions_of({ name: src }),
+      control: `captions ${src}`,
+      kinds: ['captions'],
+      value,
+      none: text.media.none,
+      chosen,
     });
   }
 
   private details(key: string, title: string, parts: HTMLElement[]): HTMLElement {
-    const details = make('details', { className: 'media-fields', open: this.open_.has(key) }, make('summary', {}, title), ...parts);
+    const details = make(
+      'details',
+      { className: 'media-fields', open: this.open_.has(key) },
+      make('summary', {}, title),
+      ...parts,
+    );
     details.addEventListener('toggle', () => {
       if (details.open) this.open_.add(key);
       else this.open_.delete(key);
@@ -114,7 +211,7 @@ export class AuthorMedia implements MediaFields {
     const select = make('select', { 'aria-label': label });
     select.dataset['control'] = control;
     const fill = (): void => {
-      const names = this.shelf_?.of_kind(kinds) ?? [];
+      const names = this.folder_?.of_kind(kinds) ?? [];
       const all = value && !names.includes(value) ? [value, ...names] : names; // the author wrote it by hand
       select.replaceChildren(new Option(none, ''), ...all.map((name) => new Option(name, name)));
       select.value = value;
@@ -124,29 +221,51 @@ export class AuthorMedia implements MediaFields {
     select.addEventListener('focus', fill); // others may have been sent meanwhile
     select.addEventListener('change', () => chosen(select.value));
     const said = make('output', { 'aria-live': 'polite' });
-    const file = make('input', { type: 'file', accept: accepted(kinds), hidden: true, 'aria-label': words.upload_for(label) });
-    const button = make('button', { type: 'button', 'aria-label': words.upload_for(label) }, words.upload);
+    const file = make('input', {
+      type: 'file',
+      accept: accepted(kinds),
+      hidden: true,
+      'aria-label': words.upload_for({ label }),
+    });
+    const button = make(
+      'button',
+      { type: 'button', 'aria-label': words.upload_for({ label }) },
+      words.upload,
+    );
     button.addEventListener('click', () => file.click());
     file.addEventListener('change', () => {
       const [sent] = file.files ?? [];
       if (sent) void this.send(sent, button, said, chosen);
       file.value = '';
     });
-    const { shelf_: shelf } = this;
-    button.disabled = shelf === undefined;
-    if (shelf === undefined) button.title = words.cannot_send;
-    return make('div', { className: 'media-choice' }, make('span', {}, label), select, button, file, said);
+    const { folder_: folder } = this;
+    button.disabled = folder === undefined;
+    if (folder === undefined) button.title = words.cannot_send;
+    return make(
+      'div',
+      { className: 'media-choice' },
+      make('span', {}, label),
+      select,
+      button,
+      file,
+      said,
+    );
   }
 
-  private async send(file: File, button: HTMLButtonElement, said: HTMLOutputElement, chosen: (name: string) => void): Promise<void> {
-    const { shelf_: shelf } = this;
-    if (!shelf) return;
+  private async send(
+    file: File,
+    button: HTMLButtonElement,
+    said: HTMLOutputElement,
+    chosen: (name: string) => void,
+  ): Promise<void> {
+    const { folder_: folder } = this;
+    if (!folder) return;
     button.disabled = true;
     try {
-      const name = await shelf.add(file, (words) => (said.textContent = words));
+      const name = await folder.add(file, (words) => (said.textContent = words));
       said.textContent = '';
       if (button.isConnected) chosen(name);
-      else by_id('author-said', HTMLOutputElement).textContent = text.media.sent(name);
+      else by_id('author-said', HTMLOutputElement).textContent = text.media.sent({ name });
     } catch (error) {
       said.textContent = error instanceof Error ? error.message : String(error);
     }

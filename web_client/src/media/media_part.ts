@@ -1,9 +1,9 @@
 // Shows and plays the media of tours. The page loads it when a tour has some.
 import { browser_storage } from '../base/browser_storage';
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { by_id, make } from '../ui/dom';
 import { MediaAddresses } from './addresses';
 import { Narrator } from './narrator';
 import { Sounds } from './sounds';
@@ -21,20 +21,22 @@ export class MediaPart {
   private stop_: Stop | undefined;
   private playing_ = false;
 
-  /** `pause`: of the tour. */
+  /** `enlarged`: as in TourMedia. */
   constructor(
     private readonly token_: () => string,
-    pause: () => void,
+    enlarged: () => void,
   ) {
     this.addresses_ = new MediaAddresses(location.href, '', '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
-      ...{ voice, background: this.background_, touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive },
+      voice,
+      background: this.background_,
+      touched: 'userActivation' in navigator && navigator.userActivation.hasBeenActive,
       storage: browser_storage('localStorage'),
       changed: () => this.update(),
     });
     this.narrator_ = new Narrator(voice, this.sounds_);
-    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing), enlarged: pause });
+    this.media_ = new StopMedia({ plays: (playing) => this.sounds_.film(playing), enlarged });
     by_id('tour', HTMLElement).append(voice);
     this.button_.addEventListener('click', () => this.sounds_.toggle());
     for (const gesture of ['pointerup', 'keydown', 'click'] as const) {
@@ -47,11 +49,14 @@ export class MediaPart {
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     const token = this.token_();
     // Sounds begin again at another address, so an author's edit does not change it.
-    if (this.addresses_for_ !== `${scene_id} ${token}`) this.addresses_ = new MediaAddresses(location.href, token, scene_id);
+    if (this.addresses_for_ !== `${scene_id} ${token}`)
+      this.addresses_ = new MediaAddresses(location.href, token, scene_id);
     this.addresses_for_ = `${scene_id} ${token}`;
     const sounds = ({ sound, stops }: Tour): boolean =>
       sound !== undefined ||
-      stops.some(({ media, narration }) => narration ?? media?.some(({ kind }) => kind !== 'image'));
+      stops.some(
+        ({ media, narration }) => narration ?? media?.some(({ kind }) => kind !== 'image'),
+      );
     this.button_.hidden = !tours.some(sounds);
     this.tour_ = undefined;
   }
@@ -87,7 +92,8 @@ export class MediaPart {
 
   /** The buttons of sounds answer to their own clicks. */
   private touched({ target }: Event): void {
-    if (!(target instanceof Element && target.closest('#button-sound, #tour-voice'))) this.sounds_.touch();
+    if (!(target instanceof Element && target.closest('#button-sound, #tour-voice')))
+      this.sounds_.touch();
   }
 
   private update(): void {
@@ -95,7 +101,9 @@ export class MediaPart {
     const label = audible ? text.media.mute : text.media.sound_on;
     this.button_.setAttribute('aria-label', label);
     this.button_.title = label;
-    this.button_.querySelector('use')?.setAttribute('href', audible ? '#icon-sound' : '#icon-muted');
+    this.button_
+      .querySelector('use')
+      ?.setAttribute('href', audible ? '#icon-sound' : '#icon-muted');
     this.media_.mute(muted);
     this.narrator_.update();
   }

@@ -1,7 +1,7 @@
 // The voice of a stop in the card of the tour: its button, and its words as text.
+import { by_id, icon, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Narration } from '../tour/media';
-import { by_id, icon, make } from '../ui/dom';
 import type { MediaAddresses } from './addresses';
 import type { Sounds } from './sounds';
 import { captions_track } from './stop_media';
@@ -17,7 +17,7 @@ export class Narrator {
     private readonly voice_: HTMLAudioElement,
     private readonly sounds_: Sounds,
   ) {
-    by_id('tour-place', HTMLElement).before(this.button_);
+    by_id('tour-position', HTMLElement).before(this.button_);
     by_id('tour-controls', HTMLElement).before(this.words_);
     this.button_.append(icon('voice'));
     this.button_.addEventListener('click', () => {

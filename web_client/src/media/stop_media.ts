@@ -1,7 +1,7 @@
 // The pictures, films and sounds of a stop, in the card of the tour.
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Medium } from '../tour/media';
-import { by_id, make } from '../ui/dom';
 import type { MediaAddresses } from './addresses';
 import { show_large } from './large_picture';
 
@@ -13,7 +13,11 @@ interface FilmListener {
 }
 
 export class StopMedia {
-  private readonly host_ = make('div', { id: 'tour-media', role: 'group', 'aria-label': text.media.of_stop });
+  private readonly host_ = make('div', {
+    id: 'tour-media',
+    role: 'group',
+    'aria-label': text.media.of_stop,
+  });
   private shown_: readonly Medium[] = [];
   private films_: HTMLMediaElement[] = [];
   private muted_ = false;
@@ -22,7 +26,8 @@ export class StopMedia {
     by_id('tour', HTMLElement).prepend(this.host_);
     // The keys of a film, and those that scroll, are not those of the page.
     this.host_.addEventListener('keydown', (event) => {
-      if (event.target instanceof HTMLMediaElement || event.target === this.host_) event.stopPropagation();
+      if (event.target instanceof HTMLMediaElement || event.target === this.host_)
+        event.stopPropagation();
     });
   }
 
@@ -46,7 +51,9 @@ export class StopMedia {
     const figure = make('figure', {});
     const fail = (): void => {
       const said = make('span', { dir: 'auto', lang: medium.language }, medium.alt || medium.src);
-      figure.replaceChildren(make('p', { className: 'missing' }, text.media.missing, make('br'), said));
+      figure.replaceChildren(
+        make('p', { className: 'missing' }, text.media.missing, make('br'), said),
+      );
       this.host_.tabIndex = 0; // what is left may hold nothing to reach by Tab
     };
     if (medium.kind === 'image') figure.append(this.picture_of(medium, addresses, fail));
@@ -57,7 +64,11 @@ export class StopMedia {
   private picture_of(medium: Medium, addresses: MediaAddresses, fail: () => void): HTMLElement {
     const picture = make('img', { alt: medium.alt, lang: medium.language, onerror: fail });
     void addresses.of(medium.src).then((address) => (picture.src = address));
-    const button = make('button', { type: 'button', title: text.media.enlarge, 'aria-haspopup': 'dialog' }, picture);
+    const button = make(
+      'button',
+      { type: 'button', title: text.media.enlarge, 'aria-haspopup': 'dialog' },
+      picture,
+    );
     button.addEventListener('click', () => {
       this.listener_.enlarged();
       show_large(picture.src, medium);
@@ -67,7 +78,10 @@ export class StopMedia {
 
   private film_of(medium: Medium, addresses: MediaAddresses, fail: () => void): HTMLElement {
     const film = make(medium.kind === 'video' ? 'video' : 'audio', {
-      ...{ controls: true, preload: 'metadata', muted: this.muted_, onerror: fail },
+      controls: true,
+      preload: 'metadata',
+      muted: this.muted_,
+      onerror: fail,
       'aria-label': medium.alt || text.media.kinds[medium.kind],
     });
     film.setAttribute('playsinline', '');
@@ -89,7 +103,11 @@ export class StopMedia {
 }
 
 /** A track of captions. Without `shown`, the page shows them itself. */
-export function captions_track(name: string, addresses: MediaAddresses, shown: boolean): HTMLTrackElement {
+export function captions_track(
+  name: string,
+  addresses: MediaAddresses,
+  shown: boolean,
+): HTMLTrackElement {
   const track = make('track', { kind: 'captions', label: text.media.captions, default: true });
   void addresses.of(name).then((address) => {
     track.src = address;

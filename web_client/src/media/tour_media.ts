@@ -1,25 +1,24 @@
 // Loads what shows, plays and edits the media of tours, where it is needed.
+import type { MediaFields } from '../author/stops';
+import { Signal } from '../base/signal';
+import { make } from '../page/dom';
 import type { TourState } from '../tour/player';
 import { has_media, type Stop, type Tour } from '../tour/tour';
-import type { MediaFields } from '../ui/author_stops';
-import { make } from '../ui/dom';
-import type { GuideMedia } from '../ui/guide';
+import type { TourMediaPart } from '../ui/scene_tours';
 import type { AuthorMedia } from './author_media';
 import type { MediaPart } from './media_part';
 
-/** What is told before the part is loaded, it hears afterwards. */
-export class TourMedia implements GuideMedia {
+/** Calls before the part is loaded are repeated afterwards. */
+export class TourMedia implements TourMediaPart {
+  /** The visitor looks at a picture in the whole window. */
+  readonly enlarged = new Signal();
   private part_: MediaPart | undefined;
   private loading_ = false;
   private tours_: readonly [scene_id: string, tours: readonly Tour[]] = ['', []];
   private state_: TourState | undefined;
   private arrived_ = false;
 
-  /** `pause_`: of the tour. */
-  constructor(
-    private readonly token_: () => string,
-    private readonly pause_: () => void,
-  ) {}
+  constructor(private readonly token_: () => string) {}
 
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     this.tours_ = [scene_id, tours];
@@ -49,7 +48,7 @@ export class TourMedia implements GuideMedia {
     this.loading_ = true;
     try {
       const { MediaPart: Part } = await import('./media_part');
-      this.part_ = new Part(this.token_, this.pause_);
+      this.part_ = new Part(this.token_, () => this.enlarged.emit());
     } catch (error) {
       console.warn('the media of the tours cannot be shown', error); // the server is away
       this.loading_ = false;
@@ -71,7 +70,12 @@ export class TourMediaFields implements MediaFields {
     this.fields_?.use(scene_id, token);
   }
 
-  of_stop(stop: () => Stop, n: string, language: string, change: (change: Partial<Stop>, field?: string) => void): HTMLElement {
+  of_stop(
+    stop: () => Stop,
+    n: string,
+    language: string,
+    change: (change: Partial<Stop>, field?: string) => void,
+  ): HTMLElement {
     return this.filled((fields) => fields.of_stop(stop, n, language, change));
   }
 
@@ -82,13 +86,16 @@ export class TourMediaFields implements MediaFields {
   private filled(fill: (fields: AuthorMedia) => HTMLElement): HTMLElement {
     if (this.fields_) return fill(this.fields_);
     const slot = make('div');
-    void import('./author_media').then(({ AuthorMedia: Fields }) => {
-      if (!this.fields_) {
-        this.fields_ = new Fields();
-        this.fields_.use(...this.scene_);
-      }
-      slot.replaceWith(fill(this.fields_));
-    }, (error: unknown) => console.warn('media cannot be edited', error));
+    void import('./author_media').then(
+      ({ AuthorMedia: Fields }) => {
+        if (!this.fields_) {
+          this.fields_ = new Fields();
+          this.fields_.use(...this.scene_);
+        }
+        slot.replaceWith(fill(this.fields_));
+      },
+      (error: unknown) => console.warn('media cannot be edited', error),
+    );
     return slot;
   }
 }

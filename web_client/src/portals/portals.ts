@@ -5,16 +5,17 @@ import { watch_token } from '../session/token';
 import { share_address, type SharedView } from '../tour/share';
 import type { Portal } from '../tour/tour';
 
-/** What is behind a portal for this visitor. Without an id it is closed. */
-export interface Door {
+/** Where a portal leads for this visitor. Without an id it is closed. */
+export interface PortalTarget {
   readonly scene_id: string | undefined;
   readonly title: string;
 }
 
 /** `scenes`: those that this visitor may see. A name counts where only one of them has it. */
-export function door_of({ scene }: Portal, scenes: readonly SceneListing[]): Door {
+export function target_of({ scene }: Portal, scenes: readonly SceneListing[]): PortalTarget {
   const named = scenes.filter(({ id }) => scene_name(id) === scene);
-  const found = scenes.find(({ id }) => id === scene) ?? (named.length === 1 ? named[0] : undefined);
+  const found =
+    scenes.find(({ id }) => id === scene) ?? (named.length === 1 ? named[0] : undefined);
   return { scene_id: found?.id, title: found?.title || scene };
 }
 
@@ -25,9 +26,14 @@ export function lasting_name(scene_id: string, scenes: readonly SceneListing[]):
 }
 
 /** Where a visitor arrives. `up`, `fov_y_rad`: of the scene behind the portal, and the present one. */
-export function arrival({ view, tour_index, stop_index }: Portal, up: Vec3, fov_y_rad: number): SharedView {
+export function arrival(
+  { view, tour_index, stop_index }: Portal,
+  up: Vec3,
+  fov_y_rad: number,
+): SharedView {
   const orientation = view?.look_at ? look_at(view.position, view.look_at, up) : view?.orientation;
-  const eye = view && orientation && { position: view.position, orientation, fov_y_rad: view.fov_y_rad ?? fov_y_rad };
+  const eye = view &&
+    orientation && { position: view.position, orientation, fov_y_rad: view.fov_y_rad ?? fov_y_rad };
   return { eye, mode: undefined, tour_index, stop_index };
 }
 

@@ -90,7 +90,9 @@ export class Display {
   read(): (Pixels & { readonly view: ShownView }) | undefined {
     const { picture_: picture, view_: view } = this;
     if (!picture || !view) return undefined;
-    const uncovered = uncovered_share(this.matrix(picture, view, this.camera_?.distance ?? Infinity));
+    const uncovered = uncovered_share(
+      this.matrix(picture, view, this.camera_?.distance ?? Infinity),
+    );
     return { ...this.presenter_.read(), view: { ...view, uncovered } };
   }
 

@@ -10,7 +10,7 @@ export interface Pixels {
 
 /** Places a picture in the view. A picture without a placing fills the view as it is. */
 export interface Placing {
-  /** From places in the view to places in the picture. */
+  /** From points of the view to points of the picture. */
   readonly matrix: Matrix3;
   /** Size of the canvas. */
   readonly width_px: number;

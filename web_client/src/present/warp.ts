@@ -6,7 +6,7 @@ import { limited_fov, type Eye } from '../camera/eye';
 export type Matrix3 = Float32Array;
 
 /**
- * Homography from places in the view to places in the picture. It is exact for the plane at `distance`
+ * Homography from points of the view to points of the picture. It is exact for the plane at `distance`
  * ahead of the view, at a right angle to its axis. With Infinity it is exact for the far field, where
  * only rotation counts. `aspect`: width over height of the picture, and of the view where that differs.
  */
@@ -38,7 +38,7 @@ export function warp_matrix(
   ]);
 }
 
-/** Place in the picture of a place in the view; undefined behind the picture's camera. */
+/** Point of the picture of a point of the view; undefined behind the picture's camera. */
 export function warped(m: Matrix3, x: number, y: number): readonly [number, number] | undefined {
   const w = m[2]! * x + m[5]! * y + m[8]!;
   if (w <= 1e-6) return undefined;
@@ -57,7 +57,15 @@ export interface Sides {
 /** How far the view reaches from the middle of the picture: 1 is the border, and 4 the most returned. */
 export function reach(m: Matrix3): Sides {
   let [x_most, y_most] = [0, 0];
-  for (const [x, y] of probes.flatMap((v) => [[v, -1], [v, 1], [-1, v], [1, v]] as const)) {
+  for (const [x, y] of probes.flatMap(
+    (v) =>
+      [
+        [v, -1],
+        [v, 1],
+        [-1, v],
+        [1, v],
+      ] as const,
+  )) {
     const at = warped(m, x, y);
     x_most = Math.max(x_most, at ? Math.abs(at[0]) : farthest);
     y_most = Math.max(y_most, at ? Math.abs(at[1]) : farthest);

@@ -3,23 +3,23 @@ import { size_of, type Pixels, type Placing, type Presenter } from './presenter'
 import type { Matrix3 } from './warp';
 
 // One triangle covers the view. Places are -1…1, y down. The perspective division is done per pixel,
-// because interpolated homogeneous places stay exact.
+// because interpolated homogeneous coordinates stay exact.
 const vertex_source = `#version 300 es
 uniform mat3 picture_from_view;
-out highp vec3 place;
+out highp vec3 point;
 void main() {
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0;
-  place = picture_from_view * vec3(corner.x, -corner.y, 1.0);
+  point = picture_from_view * vec3(corner.x, -corner.y, 1.0);
   gl_Position = vec4(corner, 0.0, 1.0);
 }`;
 
 const fragment_source = `#version 300 es
 precision mediump float;
 uniform sampler2D picture;
-in highp vec3 place;
+in highp vec3 point;
 out vec4 colour;
 void main() {
-  highp vec2 uv = 0.5 + 0.5 * place.xy / max(place.z, 1e-6);
+  highp vec2 uv = 0.5 + 0.5 * point.xy / max(point.z, 1e-6);
   colour = vec4(texture(picture, uv).rgb, 1.0);
 }`;
 
@@ -29,7 +29,7 @@ const unmoved: Matrix3 = new Float32Array([1, 0, 0, 0, 1, 0, 0, 0, 1]);
 export class WebGl2Presenter implements Presenter {
   readonly kind = 'webgl2';
   readonly can_warp = true;
-  private matrix_place_: WebGLUniformLocation | null = null;
+  private matrix_location_: WebGLUniformLocation | null = null;
 
   constructor(
     private readonly canvas_: OffscreenCanvas,
@@ -56,7 +56,7 @@ export class WebGl2Presenter implements Presenter {
       this.canvas_.height = height_px;
       gl.viewport(0, 0, width_px, height_px);
     }
-    gl.uniformMatrix3fv(this.matrix_place_, false, matrix);
+    gl.uniformMatrix3fv(this.matrix_location_, false, matrix);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
@@ -94,8 +94,8 @@ export class WebGl2Presenter implements Presenter {
       throw new Error(`presenter shader: ${gl.getProgramInfoLog(program) ?? ''}`);
     }
     gl.useProgram(program);
-    this.matrix_place_ = gl.getUniformLocation(program, 'picture_from_view');
-    gl.uniformMatrix3fv(this.matrix_place_, false, unmoved);
+    this.matrix_location_ = gl.getUniformLocation(program, 'picture_from_view');
+    gl.uniformMatrix3fv(this.matrix_location_, false, unmoved);
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
       gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);

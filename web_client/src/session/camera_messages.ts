@@ -8,7 +8,12 @@ import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
 type WireVector = NonNullable<SceneFacts['up']>;
 type WirePose = NonNullable<FrameHeader['renderPose']>;
 
-export function pose_message(pose_id: number, time_us: number, eye: Eye, at_rest = false): PoseInit {
+export function pose_message(
+  pose_id: number,
+  time_us: number,
+  eye: Eye,
+  at_rest = false,
+): PoseInit {
   const [x, y, z, w] = eye.orientation;
   return {
     poseId: BigInt(pose_id),

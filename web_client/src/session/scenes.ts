@@ -9,9 +9,14 @@ export interface SceneListing {
 }
 
 /** The scenes that this token may see; empty when the server does not answer. */
-export async function list_scenes(page_url: string, token: string): Promise<readonly SceneListing[]> {
+export async function list_scenes(
+  page_url: string,
+  token: string,
+): Promise<readonly SceneListing[]> {
   try {
-    const response = await ask_server(page_url, token, 'scenes', { signal: AbortSignal.timeout(5000) });
+    const response = await ask_server(page_url, token, 'scenes', {
+      signal: AbortSignal.timeout(5000),
+    });
     if (!response.ok) return [];
     const { scenes } = (await response.json()) as { scenes: readonly SceneListing[] };
     return scenes;
@@ -43,8 +48,14 @@ export function scene_name(scene_id: string): string {
   return scene_id.replace(/^(.+)-[b-df-hjkmnp-tv]{8}$/, '$1');
 }
 
+/** Name for files of the scene, without extension. */
+export const file_name_of = (scene_id: string): string => scene_name(scene_id) || 'scene';
+
 /** Whom a scene is from, and under which licence; '' where nothing is said. */
-export const credit_line = ({ credits, licence }: Pick<SceneListing, 'credits' | 'licence'>): string =>
+export const credit_line = ({
+  credits,
+  licence,
+}: Pick<SceneListing, 'credits' | 'licence'>): string =>
   [credits, licence].filter((words) => words).join(' · ');
 
 /** Titles for a list of scenes, and ids where several have the same title. */
@@ -67,5 +78,9 @@ export function scene_address(page_url: string, scene_id = ''): string {
 /** Whether the address leaves the scene open: it names none, and shows no view of one. Frames get the first scene. */
 export function leaves_scene_open(page_url: string): boolean {
   const { searchParams, hash } = new URL(page_url);
-  return !searchParams.get('scene') && searchParams.get('ui') !== '0' && !/[#&](at|stop|watch)=/.test(hash);
+  return (
+    !searchParams.get('scene') &&
+    searchParams.get('ui') !== '0' &&
+    !/[#&](at|stop|watch)=/.test(hash)
+  );
 }

@@ -38,14 +38,14 @@ interface SessionListener {
   stream_ended(): void;
   stats(stats: Stats): void;
   picked(picked: Picked): void;
-  /** Of the session that this one leads, watches or follows. */
+  /** Of the presentation that this session gives, watches or follows. */
   lead(lead: Lead): void;
   pinged(pinged: Pinged): void;
-  /** Where all in the company are. */
-  company(company: Company): void;
-  /** The server sent a message for people. The session goes on. */
+  /** Where all in the shared tour are. */
+  participants(company: Company): void;
+  /** The server sent a message for people. The session continues. */
   notice(message: string): void;
-  /** The selected scene cannot be entered: the server says why. The session goes on where it was. */
+  /** The selected scene cannot be entered: the server says why. The session continues where it was. */
   stayed(message: string): void;
 }
 
@@ -57,7 +57,7 @@ interface SessionEnvironment {
 }
 
 const stable_ms = 5000; // after a connection that lived this long, backoff starts anew
-const tries_to_go_along = 3; // for about a second: a leader's page presents again when it is in its new scene
+const tries_to_go_along = 3; // for about a second: a host's page presents again when it is in its new scene
 const keep_alive_ms = 10_000;
 const congested_bytes = 32 * 1024;
 const congestion_poll_ms = 20;
@@ -98,7 +98,7 @@ export class Session {
   /** Opens a new connection with other decoders, another token or another scene. */
   greet_anew(change: Partial<Greeting>): void {
     this.greeting_ = { ...this.greeting_, ...change };
-    if (change.watch !== undefined) this.forget_scene(); // the leader may be in another one
+    if (change.watch !== undefined) this.forget_scene(); // the host may be in another one
     this.retry();
   }
 
@@ -246,7 +246,12 @@ export class Session {
       case 'queue':
         if (link === this.link_) {
           const { position, estimateS, forScene } = body.value;
-          this.listener_.state({ phase: 'queued', position, estimate_s: estimateS, for_scene: forScene });
+          this.listener_.state({
+            phase: 'queued',
+            position,
+            estimate_s: estimateS,
+            for_scene: forScene,
+          });
         }
         break;
       case 'stats':
@@ -262,7 +267,7 @@ export class Session {
         if (link === this.link_) this.listener_.pinged(body.value);
         break;
       case 'company':
-        if (link === this.link_) this.listener_.company(body.value);
+        if (link === this.link_) this.listener_.participants(body.value);
         break;
       case 'error':
         this.refused(link, body.value);
@@ -286,7 +291,7 @@ export class Session {
     else if (this.last_pose_) link.send({ case: 'pose', value: this.last_pose_ });
   }
 
-  /** The leader's scene is that of a session of its own, now or when it leaves. Such a session stays one. */
+  /** The host's scene is that of a session of its own, now or when it leaves. Such a session stays one. */
   private led({ watching, mayLeave, scene }: Welcome): void {
     if (!this.greeting_.watch || (watching && !mayLeave)) return;
     this.greeting_ = { ...this.greeting_, sceneId: scene?.sceneId ?? '' };
@@ -330,9 +335,9 @@ export class Session {
       this.listener_.notice(error.message);
       this.kept_.delete('follow'); // until the visitor asks for it again
       this.greet_anew({ watch: '', follow: false });
-    } else if (lacks_leader(error.code)) {
-      if (link.welcome) this.attempt_ = 0; // the leader led until now, and may have gone to another scene
-      this.wait('no_leader', error.message);
+    } else if (lacks_host(error.code)) {
+      if (link.welcome) this.attempt_ = 0; // the host presented until now, and may have gone to another scene
+      this.wait('no_host', error.message);
     } else if (is_temporary(error.code)) {
       this.wait('refused', error.message);
     } else {
@@ -345,7 +350,7 @@ export class Session {
   /** Whether it is time to return to the session that the visitor had before. */
   private goes_along_in_vain(link: Link, code: Error_Code): boolean {
     if (!this.greeting_.watch || !this.resume_token_ || link.welcome) return false;
-    return this.attempt_ + 1 >= tries_to_go_along || !(lacks_leader(code) || is_temporary(code));
+    return this.attempt_ + 1 >= tries_to_go_along || !(lacks_host(code) || is_temporary(code));
   }
 
   /** Tries less and less often, because a fleet of one server refuses until it has ended. */
@@ -369,7 +374,7 @@ export class Session {
 
   /**
    * Keeps proxies from closing a connection on which nothing moves. The server does not count the
-   * repeated pose as activity: it warns the visitor and then gives the place to others.
+   * repeated pose as activity: it warns the visitor and then gives the slot to others.
    */
   private keep_alive(): void {
     this.cancel_keep_alive_();
@@ -388,10 +393,12 @@ function path_ahead(path: readonly PoseInit[], now_us: number): { path?: { sampl
 
 /** Whether an error refuses a scene. */
 const shuts_out = (code: Error_Code): boolean =>
-  code === Error_Code.UNKNOWN_SCENE || code === Error_Code.UNAUTHORIZED || code === Error_Code.SERVER_FULL;
+  code === Error_Code.UNKNOWN_SCENE ||
+  code === Error_Code.UNAUTHORIZED ||
+  code === Error_Code.SERVER_FULL;
 
 /** Whether there was nobody to watch. */
-const lacks_leader = (code: Error_Code): boolean =>
+const lacks_host = (code: Error_Code): boolean =>
   code === Error_Code.SESSION_ENDED || code === Error_Code.NO_LEADER;
 
 /** Whether time may cure a refusal. All others need another link, token, scene or program. */

@@ -14,5 +14,5 @@ export type WaitCause =
   | 'unreachable' // no connection could be opened
   | 'lost' // an open connection was closed
   | 'silent' // an open connection said nothing for too long
-  | 'no_leader' // this page looks on, and nobody leads now
+  | 'no_host' // this page watches, and nobody presents now
   | 'refused'; // the server said why, and trying again makes sense

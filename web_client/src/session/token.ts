@@ -7,7 +7,8 @@ function can_be_token(text: string): boolean {
   return !controls && new TextEncoder().encode(text).length <= most_bytes;
 }
 
-const fragment_of = (href: string): URLSearchParams => new URLSearchParams(new URL(href).hash.slice(1));
+const fragment_of = (href: string): URLSearchParams =>
+  new URLSearchParams(new URL(href).hash.slice(1));
 
 export const has_token = (href: string): boolean => fragment_of(href).has('token');
 

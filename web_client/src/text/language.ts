@@ -20,8 +20,8 @@ export const primary = (tag: string): string => tag.toLowerCase().split('-', 1)[
 
 /** Takes `?lang=` of the address, then the browser's list. English where the page speaks none of them. */
 export function choose_language(page_url: string, preferred: readonly string[]): LanguageChoice {
-  const wished = new URL(page_url).searchParams.get('lang');
-  const tags = [...(wished === null ? [] : [wished]), ...preferred].filter(is_tag);
+  const requested = new URL(page_url).searchParams.get('lang');
+  const tags = [...(requested === null ? [] : [requested]), ...preferred].filter(is_tag);
   for (const locale of tags) {
     const language = languages.find((known) => primary(known) === primary(locale));
     if (language) return { language, locale, readers: [tags[0]!, language] };

@@ -9,7 +9,8 @@ export const decimals = (value: number, count: number): string =>
   number(value, { minimumFractionDigits: count, maximumFractionDigits: count });
 
 /** "1.5×" */
-export const factor = (value: number): string => `${number(value, { maximumSignificantDigits: 2 })}×`;
+export const factor = (value: number): string =>
+  `${number(value, { maximumSignificantDigits: 2 })}×`;
 
 /** "a, b and c" */
 export const list = (items: readonly string[]): string => new Intl.ListFormat(locale).format(items);

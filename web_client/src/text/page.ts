@@ -17,7 +17,10 @@ export function translate_page(): void {
   }
   for (const attribute of worded_attributes) {
     for (const element of document.querySelectorAll(`[data-${attribute}]`)) {
-      element.setAttribute(attribute, text_called(text, element.getAttribute(`data-${attribute}`) ?? ''));
+      element.setAttribute(
+        attribute,
+        text_called(text, element.getAttribute(`data-${attribute}`) ?? ''),
+      );
     }
   }
 }

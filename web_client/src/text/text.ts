@@ -1,39 +1,40 @@
 // The texts of the page in the visitor's language. English is part of the page. Other languages load before
 // the page starts, and a language that does not come is replaced by English.
-import { text as english } from './en';
+import { catalogue as english } from './generated/en';
 import { choose_language, type Language, type LanguageChoice } from './language';
+import { messages, type Messages, type Translation } from './messages';
 
-/** The shape of `T`, with any texts in it. */
-type InAnyLanguage<T> = T extends string
-  ? string
-  : T extends (...values: infer V) => string
-    ? (...values: V) => string
-    : { readonly [K in keyof T]: InAnyLanguage<T[K]> };
-export type Texts = InAnyLanguage<typeof english>;
+export type Texts = Messages<typeof english>;
 
-const files: Readonly<Record<Exclude<Language, 'en'>, () => Promise<{ text: Texts }>>> = {
-  de: () => import('./de'),
-  fr: () => import('./fr'),
-  es: () => import('./es'),
-  it: () => import('./it'),
-  ja: () => import('./ja'),
-  'zh-Hans': () => import('./zh-Hans'),
-  ko: () => import('./ko'),
-  ar: () => import('./ar'),
+const translations: Readonly<
+  Record<Exclude<Language, 'en'>, () => Promise<{ default: Translation<typeof english> }>>
+> = {
+  de: () => import('../../locales/de.json'),
+  fr: () => import('../../locales/fr.json'),
+  es: () => import('../../locales/es.json'),
+  it: () => import('../../locales/it.json'),
+  ja: () => import('../../locales/ja.json'),
+  'zh-Hans': () => import('../../locales/zh-Hans.json'),
+  ko: () => import('../../locales/ko.json'),
+  ar: () => import('../../locales/ar.json'),
 };
 
-export async function load_texts(language: Language): Promise<Texts> {
-  return language === 'en' ? english : (await files[language]()).text;
+/** `locale`: in which numbers are written. */
+export async function load_texts(language: Language, locale: string): Promise<Texts> {
+  if (language === 'en') return messages(english, language, locale);
+  // Tests compare the values in the texts: they are those of English.
+  const translation = (await translations[language]()).default as typeof english;
+  return messages(translation, language, locale);
 }
 
 const in_english = choose_language('catgs:', []);
 
 async function load(choice: LanguageChoice): Promise<LanguageChoice & { readonly text: Texts }> {
   try {
-    return { ...choice, text: await load_texts(choice.language) };
+    return { ...choice, text: await load_texts(choice.language, choice.locale) };
   } catch (error) {
     console.warn('the texts could not be loaded', error); // the server is away
-    return { ...in_english, text: english };
+    return { ...in_english, text: messages(english, in_english.language, in_english.locale) };
   }
 }
 

@@ -20,7 +20,11 @@ export interface Film {
 
 type Values = readonly number[];
 
-const values_of = ({ position, target, fov_y_rad }: Shot): Values => [...position, ...target, fov_y_rad];
+const values_of = ({ position, target, fov_y_rad }: Shot): Values => [
+  ...position,
+  ...target,
+  fov_y_rad,
+];
 
 /** One knot of a cubic Hermite curve. */
 interface Knot {
@@ -31,10 +35,14 @@ interface Knot {
 
 /** A repeating film returns from its last shot to its first, in an added second where it has no time left. */
 function knots_of(film: Film): { knots: Knot[]; length_s: number } {
-  const points = film.shots.map((shot, i) => ({ time_s: film.times_s[i]!, value: values_of(shot) }));
+  const points = film.shots.map((shot, i) => ({
+    time_s: film.times_s[i]!,
+    value: values_of(shot),
+  }));
   const last_s = points[points.length - 1]?.time_s ?? 0;
   const closes = film.loop === 'repeat' && points.length > 1;
-  const length_s = closes && film.duration_s - last_s < 1e-6 ? film.duration_s + 1 : film.duration_s;
+  const length_s =
+    closes && film.duration_s - last_s < 1e-6 ? film.duration_s + 1 : film.duration_s;
   const around = (i: number): { time_s: number; value: Values } | undefined => {
     const n = points.length;
     if (i >= 0 && i < n) return points[i];
@@ -87,7 +95,13 @@ export function film_flight(film: Film, up: Vec3): Flight & { readonly repeats: 
     at: (time_s) => {
       const film_s = there_and_back && time_s > length_s ? 2 * length_s - time_s : time_s;
       const [px, py, pz, tx, ty, tz, fov_y_rad] = value_at(film_s) as [
-        number, number, number, number, number, number, number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
       ];
       const position: Vec3 = [px, py, pz];
       return { position, orientation: look_at(position, [tx, ty, tz], up), fov_y_rad };

@@ -1,6 +1,6 @@
 // What an author is editing: the tours and what the scene's sidecar says besides. Pure.
-import type { CameraMode } from '../camera/mode';
 import type { Eye } from '../camera/eye';
+import type { CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
 import { write_tours, type Stop, type Tour } from './tour';
 import { untranslated } from './words';
@@ -16,7 +16,12 @@ export interface SceneAbout {
 }
 
 export const nothing_said: SceneAbout = {
-  ...{ title: '', credits: '', licence: '', mode: undefined, background: '#000000', metres_per_unit: 0 },
+  title: '',
+  credits: '',
+  licence: '',
+  mode: undefined,
+  background: '#000000',
+  metres_per_unit: 0,
 };
 
 interface DraftState {
@@ -28,12 +33,20 @@ interface DraftState {
   readonly start: Eye | undefined;
 }
 
-const empty_tour: Tour = { title: '', ...untranslated, stops: [], way: undefined, starts_itself: false };
+const empty_tour: Tour = {
+  title: '',
+  ...untranslated,
+  stops: [],
+  way: undefined,
+  starts_itself: false,
+};
 const most_undone = 200;
 
 /** Keeps each state of the draft, so that an author can take back every edit. */
 export class TourDraft {
-  private states_: readonly DraftState[] = [{ ...first_of([]), about: nothing_said, start: undefined }];
+  private states_: readonly DraftState[] = [
+    { ...first_of([]), about: nothing_said, start: undefined },
+  ];
   private typed_in_: string | undefined; // the field of the last edit
 
   load(tours: readonly Tour[], about: SceneAbout): void {
@@ -70,7 +83,9 @@ export class TourDraft {
   }
 
   /** The first picture that nobody has described: the indices of its tour, its stop and itself. */
-  get undescribed(): { readonly tour: number; readonly stop: number; readonly medium: number } | undefined {
+  get undescribed():
+    | { readonly tour: number; readonly stop: number; readonly medium: number }
+    | undefined {
     for (const [tour, { stops }] of this.state.tours.entries()) {
       for (const [stop, { media = [] }] of stops.entries()) {
         const medium = media.findIndex(({ kind, alt }) => kind === 'image' && alt === '');
@@ -105,7 +120,10 @@ export class TourDraft {
 
   edit_tour(change: Partial<Tour>, field?: string): void {
     const { tours, edited } = this.state;
-    this.edit({ tours: tours.map((tour, i) => (i === edited ? { ...tour, ...change } : tour)) }, field);
+    this.edit(
+      { tours: tours.map((tour, i) => (i === edited ? { ...tour, ...change } : tour)) },
+      field,
+    );
   }
 
   edit_about(change: Partial<SceneAbout>, field?: string): void {
@@ -131,14 +149,19 @@ export class TourDraft {
   }
 
   change(index: number, change: Partial<Stop>, field?: string): void {
-    this.edit_tour({ stops: this.stops.map((stop, i) => (i === index ? { ...stop, ...change } : stop)) }, field);
+    this.edit_tour(
+      { stops: this.stops.map((stop, i) => (i === index ? { ...stop, ...change } : stop)) },
+      field,
+    );
   }
 
   /** Swaps a stop with its neighbour. `by`: 1 or -1. */
   move(index: number, by: number): void {
     const [stop, neighbour] = [this.stops[index], this.stops[index + by]];
     if (!stop || !neighbour) return;
-    const swapped = this.stops.map((other, i) => (i === index ? neighbour : i === index + by ? stop : other));
+    const swapped = this.stops.map((other, i) =>
+      i === index ? neighbour : i === index + by ? stop : other,
+    );
     this.edit_tour({ stops: swapped });
   }
 

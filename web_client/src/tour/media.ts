@@ -1,6 +1,6 @@
 // What stops show and play besides words: pictures, films and sounds. Pure.
 import { text } from '../text/text';
-import type { JsonPlace } from './json_place';
+import type { JsonField } from './json_field';
 import { max_languages, max_media } from './limits';
 import { tag_for } from './words';
 
@@ -47,7 +47,9 @@ const extensions: Readonly<Record<MediaKind | 'captions', readonly string[]>> = 
 /** What the extension of a name or an address promises; undefined: nothing that is known. */
 export function kind_of(src: string): MediaKind | 'captions' | undefined {
   const extension = /\.(\w+)(?:[?#].*)?$/.exec(src)?.[1]?.toLowerCase() ?? '';
-  return ([...media_kinds, 'captions'] as const).find((kind) => extensions[kind].includes(extension));
+  return ([...media_kinds, 'captions'] as const).find((kind) =>
+    extensions[kind].includes(extension),
+  );
 }
 
 /** For file choosers: ".jpg,.jpeg,…". */
@@ -60,58 +62,70 @@ export const is_foreign = (src: string): boolean => src.startsWith('https://');
 const { mistakes } = text.media;
 
 /** Reads `src`, and `type` where the extension does not tell the kind. */
-function read_source(place: JsonPlace): { src: string; kind: MediaKind } {
-  const source = place.at('src');
+function read_source(field: JsonField): { src: string; kind: MediaKind } {
+  const source = field.at('src');
   const src = source.text();
   if (!is_foreign(src) && !/^[\w-][\w.-]{0,99}$/.test(src)) source.fail(mistakes.no_media_name);
-  const written = place.find('type');
-  const kind = written === undefined ? kind_of(src) : media_kinds.find((name) => name === written.text());
+  const written = field.find('type');
+  const kind =
+    written === undefined ? kind_of(src) : media_kinds.find((name) => name === written.text());
   if (kind !== undefined && kind !== 'captions') return { src, kind };
   return (written ?? source).fail(mistakes.no_media_kind);
 }
 
-function read_captions(place: JsonPlace): string {
-  const captions = place.find('captions');
+function read_captions(field: JsonField): string {
+  const captions = field.find('captions');
   const name = captions?.text() ?? '';
-  if (captions && (is_foreign(name) || kind_of(name) !== 'captions')) captions.fail(mistakes.no_captions);
+  if (captions && (is_foreign(name) || kind_of(name) !== 'captions'))
+    captions.fail(mistakes.no_captions);
   return name;
 }
 
-export const read_media = (media: JsonPlace | undefined): readonly Medium[] | undefined =>
-  media?.elements(max_media).map((place) => {
-    const { src, kind } = read_source(place);
-    const alt = (kind === 'image' ? place.at('alt') : place.find('alt'))?.text() ?? '';
-    const translations = place.find('translations')?.members(max_languages) ?? [];
-    const alt_in = new Map(translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']));
-    return { src, kind, alt, alt_in, language: '', captions: read_captions(place) };
+export const read_media = (media: JsonField | undefined): readonly Medium[] | undefined =>
+  media?.elements(max_media).map((field) => {
+    const { src, kind } = read_source(field);
+    const alt = (kind === 'image' ? field.at('alt') : field.find('alt'))?.text() ?? '';
+    const translations = field.find('translations')?.members(max_languages) ?? [];
+    const alt_in = new Map(
+      translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']),
+    );
+    return { src, kind, alt, alt_in, language: '', captions: read_captions(field) };
   });
 
-function read_sound(place: JsonPlace): string {
-  const { src, kind } = read_source(place);
-  if (kind !== 'audio') place.at('src').fail(mistakes.no_sound);
+function read_sound(field: JsonField): string {
+  const { src, kind } = read_source(field);
+  if (kind !== 'audio') field.at('src').fail(mistakes.no_sound);
   return src;
 }
 
-export const read_narration = (place: JsonPlace | undefined): Narration | undefined =>
-  place && { src: read_sound(place), captions: read_captions(place) };
+export const read_narration = (field: JsonField | undefined): Narration | undefined =>
+  field && { src: read_sound(field), captions: read_captions(field) };
 
-export const read_tour_sound = (place: JsonPlace | undefined): TourSound | undefined =>
-  place && { src: read_sound(place), volume: place.find('volume')?.number(0, 1) ?? usual_volume };
+export const read_tour_sound = (field: JsonField | undefined): TourSound | undefined =>
+  field && { src: read_sound(field), volume: field.find('volume')?.number(0, 1) ?? usual_volume };
 
 /** The media as a visitor reads of them, in the first of these languages that each has. */
-export const media_for = (media: readonly Medium[], readers: readonly string[]): readonly Medium[] =>
+export const media_for = (
+  media: readonly Medium[],
+  readers: readonly string[],
+): readonly Medium[] =>
   media.map((medium) => {
     const language = tag_for([...medium.alt_in.keys()], readers);
     const alt = language === undefined ? '' : medium.alt_in.get(language);
     return language !== undefined && alt ? { ...medium, alt, language } : medium;
   });
 
-const write_source = (src: string, kind: MediaKind): object => ({ src, ...(kind_of(src) !== kind && { type: kind }) });
+const write_source = (src: string, kind: MediaKind): object => ({
+  src,
+  ...(kind_of(src) !== kind && { type: kind }),
+});
 
 /** Writes what read_media() reads. */
 export const write_media = (media: readonly Medium[]): unknown[] =>
   media.map(({ src, kind, alt, alt_in, captions }) => {
-    const translations = [...alt_in].flatMap(([tag, words]) => (words ? [[tag, { alt: words }] as const] : []));
+    const translations = [...alt_in].flatMap(([tag, words]) =>
+      words ? [[tag, { alt: words }] as const] : [],
+    );
     return {
       ...write_source(src, kind),
       ...(alt && { alt }),

@@ -124,7 +124,8 @@ export class TourPlayer {
     if (!tour) return;
     this.playing_ = true;
     if (tour.way) this.run_film(tour.way, tour.way.repeats);
-    else this.travel(this.stop_index_ === undefined ? 0 : (this.stop_index_ + 1) % tour.stops.length);
+    else
+      this.travel(this.stop_index_ === undefined ? 0 : (this.stop_index_ + 1) % tour.stops.length);
   }
 
   /** Stops playing. The page also calls this when the visitor takes over. */

@@ -1,6 +1,5 @@
 // Saves a scene's sidecar to the server. The server accepts it from authors.
 import { ask_server, scene_path } from '../base/server';
-import { number } from '../text/number';
 import { text } from '../text/text';
 import { max_sidecar_bytes } from './limits';
 
@@ -23,7 +22,10 @@ export async function save_sidecar(
 ): Promise<SaveResult> {
   const body = new Blob([sidecar], { type: 'application/json' });
   if (body.size > max_sidecar_bytes)
-    return { kind: 'refused', why: text.author.too_large(number(body.size), number(max_sidecar_bytes)) };
+    return {
+      kind: 'refused',
+      why: text.author.too_large({ bytes: body.size, most: max_sidecar_bytes }),
+    };
   const headers: Record<string, string> = {};
   if (made_from === null) headers['if-none-match'] = '*';
   else if (made_from !== undefined) headers['if-match'] = made_from;
@@ -43,5 +45,7 @@ export async function save_sidecar(
 export function refusal(status: number, answer: string): string {
   const [line = ''] = answer.split('\n');
   const prefix = `${status}: `;
-  return line.startsWith(prefix) ? line.slice(prefix.length) : text.author.status(status);
+  return line.startsWith(prefix)
+    ? line.slice(prefix.length)
+    : text.author.status({ status: String(status) });
 }

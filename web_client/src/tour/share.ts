@@ -31,7 +31,11 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
 }
 
 /** The page's address for those who follow the session of this watch token. */
-export function presentation_address(page_url: string, scene_id: string, watch_token: string): string {
+export function presentation_address(
+  page_url: string,
+  scene_id: string,
+  watch_token: string,
+): string {
   const nowhere = { eye: undefined, mode: undefined, tour_index: undefined, stop_index: undefined };
   const url = new URL(share_address(page_url, scene_id, nowhere));
   url.hash = new URLSearchParams({ watch: watch_token }).toString();
@@ -58,7 +62,14 @@ function read_eye(written: string): Eye | undefined {
   const parts = written.split(',');
   const numbers = parts.map(Number);
   const [px, py, pz, x, y, z, w, fov_deg] = numbers as [
-    number, number, number, number, number, number, number, number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
+    number,
   ];
   const good =
     parts.length === 8 &&
@@ -83,7 +94,9 @@ export function frame_sites(header: string | null): readonly string[] | undefine
   return (header ?? '')
     .split(',')
     .map(sites_of_policy)
-    .reduce((both, sites) => (both && sites ? both.filter((site) => sites.includes(site)) : (both ?? sites)));
+    .reduce((both, sites) =>
+      both && sites ? both.filter((site) => sites.includes(site)) : (both ?? sites),
+    );
 }
 
 function sites_of_policy(policy: string): readonly string[] | undefined {

@@ -3,7 +3,7 @@ import { look_at, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { text } from '../text/text';
 import { film_flight, type Shot } from './camera_spline';
-import { JsonPlace } from './json_place';
+import { JsonField } from './json_field';
 import type { Stop, Tour } from './tour';
 import { untranslated } from './words';
 
@@ -22,12 +22,12 @@ const to_scene = ([x, y, z]: Vec3): Vec3 => [-x, -y, z];
 const up: Vec3 = [0, -1, 0]; // its +y
 
 /** Fields of view in the file are degrees of the longer side of the view. */
-function vertical_fov(fov: JsonPlace, aspect: number): number {
+function vertical_fov(fov: JsonField, aspect: number): number {
   const longer = Math.tan((fov.number(1, 170) * Math.PI) / 360);
   return 2 * Math.atan(longer / Math.max(1, aspect));
 }
 
-function read_camera(camera: JsonPlace, aspect: number): Eye {
+function read_camera(camera: JsonField, aspect: number): Eye {
   const pose = camera.at('initial');
   const position = to_scene(pose.at('position').vec3());
   return {
@@ -37,7 +37,7 @@ function read_camera(camera: JsonPlace, aspect: number): Eye {
   };
 }
 
-function read_annotation(annotation: JsonPlace, aspect: number): Stop {
+function read_annotation(annotation: JsonField, aspect: number): Stop {
   return {
     title: annotation.at('title').text(),
     caption: annotation.find('text')?.text() ?? '',
@@ -50,7 +50,7 @@ function read_annotation(annotation: JsonPlace, aspect: number): Stop {
   };
 }
 
-function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): Tour | undefined {
+function read_track(track: JsonField, aspect: number, starts_itself: boolean): Tour | undefined {
   const rate = track.at('frameRate').number(0.001, 10_000);
   const frames = track.at('keyframes').at('times').elements(most_entries);
   if (frames.length === 0) return undefined;
@@ -66,7 +66,7 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
     values.fail(mistakes.not_three_each);
   }
   if (fovs.length !== frames.length) values.fail(mistakes.not_one_each);
-  const triple = (list: JsonPlace[], i: number): Vec3 =>
+  const triple = (list: JsonField[], i: number): Vec3 =>
     to_scene([list[3 * i]!.number(), list[3 * i + 1]!.number(), list[3 * i + 2]!.number()]);
   const shots = frames.map(
     (_, i): Shot => ({
@@ -87,23 +87,31 @@ function read_track(track: JsonPlace, aspect: number, starts_itself: boolean): T
     },
     up,
   );
-  return { title: track.find('name')?.text() ?? '', ...untranslated, stops: [], way, starts_itself };
+  return {
+    title: track.find('name')?.text() ?? '',
+    ...untranslated,
+    stops: [],
+    way,
+    starts_itself,
+  };
 }
 
-/** Throws an error that names the place it cannot read. `aspect`: width over height of the view. */
+/** Throws an error that names the field it cannot read. `aspect`: width over height of the view. */
 export function read_supersplat(document: unknown, aspect: number): ImportedTours {
-  const settings = new JsonPlace('settings.json', document);
+  const settings = new JsonField('settings.json', document);
   const version = settings.find('version')?.number();
-  if (version !== 2) settings.fail(mistakes.version(version ?? 1, 2));
+  if (version !== 2) settings.fail(mistakes.version({ found: String(version ?? 1), read: '2' }));
   const mode = settings.find('startMode')?.text() ?? 'default';
-  const list = (key: string): JsonPlace[] => settings.find(key)?.elements(most_entries) ?? [];
+  const list = (key: string): JsonField[] => settings.find(key)?.elements(most_entries) ?? [];
 
   const stops = list('annotations').map((entry) => read_annotation(entry, aspect));
   const films = list('animTracks').flatMap((track, i) => {
     return read_track(track, aspect, mode === 'animTrack' && i === 0) ?? [];
   });
   const annotated: Tour[] =
-    stops.length > 0 ? [{ title: '', ...untranslated, stops, way: undefined, starts_itself: false }] : [];
+    stops.length > 0
+      ? [{ title: '', ...untranslated, stops, way: undefined, starts_itself: false }]
+      : [];
   const camera = list('cameras')[0];
   const first = mode === 'annotation' ? stops[0]?.eye : undefined;
   return {

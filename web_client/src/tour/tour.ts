@@ -3,7 +3,7 @@ import { look_at, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
 import { text } from '../text/text';
-import { JsonPlace } from './json_place';
+import { JsonField } from './json_field';
 import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
 import {
   media_for,
@@ -26,7 +26,7 @@ export interface Portal {
   readonly view:
     | {
         readonly position: Vec3;
-        /** The place that is looked at with the up of that scene, or an orientation. */
+        /** The point that is looked at with the up of that scene, or an orientation. */
         readonly look_at: Vec3 | undefined;
         readonly orientation: Quat | undefined;
         readonly fov_y_rad: number | undefined;
@@ -61,7 +61,8 @@ export interface Tour extends Worded {
 
 /** Whether a tour shows or plays more than words. */
 export const has_media = ({ sound, stops }: Tour): boolean =>
-  sound !== undefined || stops.some(({ media, narration }) => narration !== undefined || (media ?? []).length > 0);
+  sound !== undefined ||
+  stops.some(({ media, narration }) => narration !== undefined || (media ?? []).length > 0);
 
 /** Time that a visitor needs to look around and to read. */
 export function default_stay_s(stop: Stop): number {
@@ -73,11 +74,11 @@ export const flight_to = (stop: Stop, from: Eye, reach: number): Flight =>
   glide(from, stop.eye, stop.fly_s ?? glide_time_s(from, stop.eye, reach));
 
 /**
- * Reads `tours` of a sidecar (README.md). Throws an error that names the wrong place. `up`: that of the
+ * Reads `tours` of a sidecar (TOURS.md). Throws an error that names the wrong field. `up`: that of the
  * scene. `fov_y_rad`: for stops that give none.
  */
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
-  return new JsonPlace('tours', document).elements(max_tours).map((tour) => ({
+  return new JsonField('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
     ...read_translations(tour),
     stops: tour
@@ -90,7 +91,7 @@ export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour
   }));
 }
 
-function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
+function read_stop(stop: JsonField, up: Vec3, fov_y_rad: number): Stop {
   const position = stop.at('position').vec3();
   const target = stop.find('look_at')?.vec3();
   const orientation = target ? look_at(position, target, up) : orientation_of(stop);
@@ -108,11 +109,14 @@ function read_stop(stop: JsonPlace, up: Vec3, fov_y_rad: number): Stop {
   };
 }
 
-/** For places without `look_at`. */
-const orientation_of = (place: JsonPlace): Quat =>
-  (place.find('orientation') ?? place.fail(text.mistakes.missing_both('look_at', 'orientation'))).orientation();
+/** For views without `look_at`. */
+const orientation_of = (field: JsonField): Quat =>
+  (
+    field.find('orientation') ??
+    field.fail(text.mistakes.missing_both({ one: 'look_at', other: 'orientation' }))
+  ).orientation();
 
-function read_portal(portal: JsonPlace | undefined): Portal | undefined {
+function read_portal(portal: JsonField | undefined): Portal | undefined {
   if (!portal) return undefined;
   const position = portal.find('position')?.vec3();
   const target = portal.find('look_at')?.vec3();
@@ -129,7 +133,7 @@ function read_portal(portal: JsonPlace | undefined): Portal | undefined {
   };
 }
 
-function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'language'> {
+function read_translations(item: JsonField): Pick<Worded, 'translations' | 'language'> {
   const written = item.find('translations')?.members(max_languages) ?? [];
   const translations = new Map(
     written.map(([tag, words]) => [
@@ -144,7 +148,10 @@ function read_translations(item: JsonPlace): Pick<Worded, 'translations' | 'lang
 export const tours_for = (tours: readonly Tour[], readers: readonly string[]): readonly Tour[] =>
   tours.map((tour) => ({
     ...in_language(tour, readers),
-    stops: tour.stops.map((stop) => ({ ...in_language(stop, readers), media: stop.media && media_for(stop.media, readers) })),
+    stops: tour.stops.map((stop) => ({
+      ...in_language(stop, readers),
+      media: stop.media && media_for(stop.media, readers),
+    })),
   }));
 
 const short = (v: number): number => Number(v.toPrecision(7));
@@ -192,7 +199,9 @@ function write_portal({ scene, view, tour_index, stop_index }: Portal): object {
 
 function write_translations(translations: Worded['translations']): object {
   const written = [...translations].flatMap(([tag, { title, caption }]) =>
-    title || caption ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const] : [],
+    title || caption
+      ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const]
+      : [],
   );
   return written.length > 0 ? { translations: Object.fromEntries(written) } : {};
 }

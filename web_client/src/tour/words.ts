@@ -16,7 +16,10 @@ export interface Worded extends Partial<Words> {
 }
 
 /** Of a tour or a stop in one language that nobody named. */
-export const untranslated: Pick<Worded, 'translations' | 'language'> = { translations: new Map(), language: '' };
+export const untranslated: Pick<Worded, 'translations' | 'language'> = {
+  translations: new Map(),
+  language: '',
+};
 
 /** The tag for the first of `readers` that has one; undefined: none has. */
 export function tag_for(tags: readonly string[], readers: readonly string[]): string | undefined {

@@ -1,12 +1,12 @@
-// window.catgs: a small interface for tests and for pages that drive the viewer (README.md).
+// window.catgs: a small interface for tests and for pages that drive the viewer (EMBED.md).
 import { browser_timers, type Clock, type Timers } from '../base/clock';
 import type { CameraController } from '../camera/camera_controller';
 import type { Pose } from '../camera/eye';
 import { same_angle_rad, same_view } from '../camera/same_view';
+import type { Navigation } from '../page/navigation';
 import type { StatsSnapshot } from '../stats/metrics';
 import type { WorkerClient } from '../worker/client';
 import type { FromWorker, Snapshot } from '../worker/messages';
-import type { Navigation } from './navigation';
 
 interface Automation {
   /** Puts the camera there. Camera axes: x right, y down, z forward; quaternion x, y, z, w. */

@@ -1,6 +1,6 @@
 import { Signal } from '../base/signal';
+import { by_id, make } from '../page/dom';
 import { scene_address, scene_labels, type SceneListing } from '../session/scenes';
-import { by_id, make } from './dom';
 import type { Card } from './wording';
 
 /** The card over the picture: what is going on while no picture says it. */
@@ -22,7 +22,8 @@ export class CardView {
     this.action_.addEventListener('click', () => {
       const action = this.shown_?.action;
       if (action?.does === 'reload') location.reload();
-      else if (action?.does === 'open') location.href = scene_address(location.href, action.scene_id);
+      else if (action?.does === 'open')
+        location.href = scene_address(location.href, action.scene_id);
       else if (action?.does === 'call') this.promise_call();
       else if (action?.does === 'look') this.token_given.emit('');
       else this.retried.emit();
@@ -47,7 +48,8 @@ export class CardView {
     by_id('card-stays', HTMLElement).hidden = true;
     show_links(by_id('card-scenes', HTMLUListElement), card.scenes ?? []);
     this.form_.hidden = card.asks_token !== true;
-    this.action_.hidden = card.action === undefined || (card.action.does === 'call' && this.will_call_);
+    this.action_.hidden =
+      card.action === undefined || (card.action.does === 'call' && this.will_call_);
     this.action_.textContent = card.action?.label ?? '';
   }
 
@@ -67,6 +69,12 @@ function show_links(list: HTMLElement, scenes: readonly SceneListing[]): void {
   list.hidden = scenes.length === 0;
   const labels = scene_labels(scenes);
   list.replaceChildren(
-    ...scenes.map(({ id }, i) => make('li', {}, make('a', { dir: 'auto', href: scene_address(location.href, id) }, labels[i] ?? id))),
+    ...scenes.map(({ id }, i) =>
+      make(
+        'li',
+        {},
+        make('a', { dir: 'auto', href: scene_address(location.href, id) }, labels[i] ?? id),
+      ),
+    ),
   );
 }

@@ -1,25 +1,26 @@
 // Lets the page that shows this one in a frame drive it. The server names the pages that may do so
 // (--embed-origin). Browsers do not load this page in other frames, so the parent window is one of them.
 import type { Eye } from '../camera/eye';
-import { JsonPlace } from '../tour/json_place';
+import { JsonField } from '../tour/json_field';
 import { max_stops } from '../tour/limits';
+import type { TourPlayer } from '../tour/player';
 
 interface EmbedTarget {
-  eye(): Eye;
-  set_eye(eye: Eye): void;
-  go_to(stop_index: number): void;
-  next(): void;
-  previous(): void;
-  play(): void;
-  pause(): void;
-  reset(): void;
+  readonly player: Pick<TourPlayer, 'go_to' | 'next' | 'previous' | 'play' | 'pause'>;
+  readonly navigation: { readonly eye: Eye; reset(): void };
+  put(eye: Eye): void;
 }
 
 /** Messages to the parent, sent once it has said hello. */
 type EmbedNews =
   | { readonly catgs: 'ready'; readonly scene: string; readonly stops: readonly string[] }
   | { readonly catgs: 'stop'; readonly stop: number | null; readonly playing: boolean }
-  | { readonly catgs: 'pose'; readonly position: readonly number[]; readonly orientation: readonly number[]; readonly fov_deg: number };
+  | {
+      readonly catgs: 'pose';
+      readonly position: readonly number[];
+      readonly orientation: readonly number[];
+      readonly fov_deg: number;
+    };
 
 export class EmbedApi {
   private origin_: string | undefined; // origin of the parent, once it has spoken
@@ -33,7 +34,7 @@ export class EmbedApi {
     window_.addEventListener('message', (event) => {
       if (event.source !== window_.parent) return;
       try {
-        this.heard(new JsonPlace('message', event.data), event.origin);
+        this.heard(new JsonField('message', event.data), event.origin);
       } catch (error) {
         console.warn('a message of the page around this one was not understood', error);
       }
@@ -46,7 +47,7 @@ export class EmbedApi {
     if (this.origin_ !== undefined) this.window_.parent.postMessage(news, this.origin_);
   }
 
-  private heard(message: JsonPlace, origin: string): void {
+  private heard(message: JsonField, origin: string): void {
     const command = message.find('catgs')?.text();
     if (command === undefined) return; // the message is for something else
     this.origin_ = origin;
@@ -55,7 +56,7 @@ export class EmbedApi {
         if (this.ready_) this.say(this.ready_);
         break;
       case 'stop':
-        this.target_.go_to(message.at('stop').number(0, max_stops - 1));
+        this.target_.player.go_to(message.at('stop').number(0, max_stops - 1));
         break;
       case 'pose':
         this.set_pose(message);
@@ -67,24 +68,26 @@ export class EmbedApi {
       case 'previous':
       case 'play':
       case 'pause':
+        this.target_.player[command]();
+        break;
       case 'reset':
-        this.target_[command]();
+        this.target_.navigation.reset();
         break;
       default:
         throw new Error(`'${command}' is no command`);
     }
   }
 
-  private set_pose(message: JsonPlace): void {
-    this.target_.set_eye({
+  private set_pose(message: JsonField): void {
+    this.target_.put({
       position: message.at('position').vec3(),
       orientation: message.at('orientation').orientation(),
-      fov_y_rad: message.find('fov_deg')?.fov_rad() ?? this.target_.eye().fov_y_rad,
+      fov_y_rad: message.find('fov_deg')?.fov_rad() ?? this.target_.navigation.eye.fov_y_rad,
     });
   }
 
   private tell_pose(): void {
-    const { position, orientation, fov_y_rad } = this.target_.eye();
+    const { position, orientation, fov_y_rad } = this.target_.navigation.eye;
     this.say({ catgs: 'pose', position, orientation, fov_deg: (fov_y_rad * 180) / Math.PI });
   }
 }

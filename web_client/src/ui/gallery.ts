@@ -1,7 +1,13 @@
 // The first page of a server with several scenes: a picture of each.
-import { credit_line, fetch_poster, scene_address, scene_labels, type SceneListing } from '../session/scenes';
+import { by_id, make } from '../page/dom';
+import {
+  credit_line,
+  fetch_poster,
+  scene_address,
+  scene_labels,
+  type SceneListing,
+} from '../session/scenes';
 import { text } from '../text/text';
-import { by_id, make } from './dom';
 
 const next_try_ms = 5000;
 const tries = 60; // five minutes: a scene that is not loaded by then has more important visitors before it
@@ -26,7 +32,11 @@ export function show_gallery(scenes: readonly SceneListing[], token: string): vo
       const link = make(
         'a',
         { href: scene_address(location.href, scene.id) },
-        ...[picture, make('strong', { dir: 'auto' }, labels[i] ?? scene.id), make('small', { dir: 'auto' }, credit_line(scene))],
+        ...[
+          picture,
+          make('strong', { dir: 'auto' }, labels[i] ?? scene.id),
+          make('small', { dir: 'auto' }, credit_line(scene)),
+        ],
       );
       return make('li', {}, link);
     }),
@@ -36,7 +46,11 @@ export function show_gallery(scenes: readonly SceneListing[], token: string): vo
   document.title = `${text.page.scenes} – CaT-GS`;
 }
 
-async function show_poster(picture: HTMLImageElement, scene_id: string, token: string): Promise<void> {
+async function show_poster(
+  picture: HTMLImageElement,
+  scene_id: string,
+  token: string,
+): Promise<void> {
   for (let i = 0; i < tries; ++i) {
     const poster = await fetch_poster(location.href, token, scene_id);
     if (poster instanceof Blob) {

@@ -1,13 +1,13 @@
-import { caption_words } from '../captions/caption';
 import type { Eye } from '../camera/eye';
-import { place_of } from '../camera/ray';
+import { project } from '../camera/ray';
+import { caption_words } from '../captions/caption';
+import { by_id, icon, make } from '../page/dom';
+import type { SeenCamera } from '../page/seen_camera';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
-import { by_id, icon, make } from './dom';
-import type { Doors } from './doors';
-import type { SeenCamera } from './seen_camera';
+import type { PortalScenes } from './portal_scenes';
 
 /** Shows the stops of a tour as buttons in the picture. */
 export class Hotspots {
@@ -19,35 +19,34 @@ export class Hotspots {
   constructor(
     private readonly view_: HTMLElement,
     seen: SeenCamera,
-    private readonly doors_: Doors,
+    private readonly scenes_: PortalScenes,
     private readonly go_to_: (stop_index: number) => void,
   ) {
     window.addEventListener('keydown', ({ code }) => {
       // A label may hide what is behind it (WCAG 1.4.13).
       if (code === 'Escape') this.host_.classList.add('labels-dismissed');
     });
-    seen.moved.listen((eye) => this.place(eye));
+    seen.moved.listen((eye) => this.put(eye));
   }
 
   /** `eye`: the camera of the view. */
   show({ tour, stop }: TourState, eye: Eye): void {
     if (tour !== this.tour_) this.show_tour(tour);
-    // The tour goes on, and the button of an earlier stop may still have the focus.
+    // The tour continues, and the button of an earlier stop may still have the focus.
     if (stop !== this.stop_) this.host_.classList.add('labels-dismissed');
     this.stop_ = stop;
     for (const { stop: other, button } of this.spots_) {
       if (other === stop) button.setAttribute('aria-current', 'step');
       else button.removeAttribute('aria-current');
     }
-    this.place(eye);
+    this.put(eye);
   }
 
-  private place(eye: Eye): void {
+  private put(eye: Eye): void {
     const { clientWidth: width_px, clientHeight: height_px } = this.view_;
     for (const { stop, button } of this.spots_) {
-      const place = stop.marker && place_of(stop.marker, eye, width_px / height_px);
-      const inside =
-        place && place[0] > 0 && place[0] < 1 && place[1] > 0 && place[1] < 1 ? place : undefined;
+      const at = stop.marker && project(stop.marker, eye, width_px / height_px);
+      const inside = at && at[0] > 0 && at[0] < 1 && at[1] > 0 && at[1] < 1 ? at : undefined;
       button.hidden = !inside;
       if (!inside) continue;
       const [x, y] = [inside[0] * width_px, inside[1] * height_px];
@@ -60,12 +59,12 @@ export class Hotspots {
     this.tour_ = tour;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
-      const door = stop.portal && this.doors_.behind(stop.portal);
-      const sign = door ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
+      const target = stop.portal && this.scenes_.target_of(stop.portal);
+      const sign = target ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
       // It is hidden until it is placed.
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
-      button.classList.toggle('door', door !== undefined);
-      button.append(label_of(stop, i, button, door && text.portals.to(door.title)));
+      button.classList.toggle('portal', target !== undefined);
+      button.append(label_of(stop, i, button, target && text.portals.to({ scene: target.title })));
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {
@@ -82,10 +81,19 @@ export class Hotspots {
 }
 
 /** Where it leads or its title, and its caption. They appear when a visitor points at the hotspot or reaches it by Tab. */
-function label_of(stop: Stop, index: number, button: HTMLButtonElement, leads_to: string | undefined): HTMLElement {
-  const title = leads_to ?? (stop.title || text.tour.stop_numbered(number(index + 1)));
+function label_of(
+  stop: Stop,
+  index: number,
+  button: HTMLButtonElement,
+  leads_to: string | undefined,
+): HTMLElement {
+  const title = leads_to ?? (stop.title || text.tour.stop_numbered({ n: index + 1 }));
   const lang = stop.title && !leads_to ? stop.language : language;
-  const label = make('span', { className: 'hotspot-label', dir: 'auto', lang }, make('span', { className: 'hotspot-name' }, title));
+  const label = make(
+    'span',
+    { className: 'hotspot-label', dir: 'auto', lang },
+    make('span', { className: 'hotspot-name' }, title),
+  );
   if (stop.caption) {
     // The title alone is the name of the button; the caption describes it.
     const id = `hotspot-caption-${index}`;

@@ -1,29 +1,23 @@
-// Measures lengths, heights and areas between places that the visitor points at.
+// Measures lengths, heights and areas between points that the visitor marks.
 import type { Eye } from '../camera/eye';
-import { place_of } from '../camera/ray';
+import { project } from '../camera/ray';
+import type { Pointed } from '../input/pointers';
 import { area_of, length_of, rise_of, type Mark } from '../measure/measurement';
 import { system_here, systems, written, type Scale, type System } from '../measure/units';
+import { by_id, make, on_click } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
-import { by_id, make, on_click } from './dom';
-import type { Navigation } from './navigation';
-import type { SeenCamera } from './seen_camera';
-import type { Toolbar } from './toolbar';
 
 const most_marks = 100;
 const system_key = 'catgs.units';
 const svg = 'http://www.w3.org/2000/svg';
 
-interface MeasureParts {
-  readonly view: HTMLElement;
-  readonly navigation: Navigation;
-  readonly toolbar: Toolbar;
-  readonly seen: SeenCamera;
-  readonly storage: Storage | undefined;
+interface MeasureParts extends PageParts {
   /** Of authors: the scene has this scale from now on. */
   readonly set_scale: ((metres_per_unit: number) => void) | undefined;
 }
 
-/** While its panel is open, clicks and taps mark places. */
+/** While its panel is open, clicks and taps mark points. */
 export class MeasurePanel {
   private readonly lines_ = document.createElementNS(svg, 'svg');
   private readonly results_ = by_id('measure-results', HTMLElement);
@@ -39,7 +33,8 @@ export class MeasurePanel {
     this.lines_.id = 'measure-lines';
     this.lines_.setAttribute('aria-hidden', 'true');
     by_id('hotspots', HTMLElement).before(this.lines_);
-    this.system_.value = systems.find((system) => system === storage?.getItem(system_key)) ?? system_here();
+    this.system_.value =
+      systems.find((system) => system === storage?.getItem(system_key)) ?? system_here();
     this.system_.addEventListener('change', () => {
       storage?.setItem(system_key, this.system_.value);
       this.show();
@@ -51,9 +46,9 @@ export class MeasurePanel {
     on_click('measure-set', () => this.set_scale());
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel !== 'measure') return;
-      if (shown) navigation.tapped = this.tapped;
-      else if (navigation.tapped === this.tapped) navigation.tapped = undefined;
-      if (!shown) this.set([]);
+      if (shown) return navigation.gestures.set('measure', this.take);
+      navigation.gestures.remove('measure');
+      this.set([]);
     });
     navigation.entered.listen(({ scene }) => {
       this.metres_per_unit_ = scene.metresPerUnit || undefined;
@@ -63,7 +58,11 @@ export class MeasurePanel {
     this.show();
   }
 
-  private readonly tapped = (x: number, y: number): void => void this.mark(x, y);
+  /** The first of two clicks has marked the point already. */
+  private readonly take = ({ x, y, how }: Pointed): boolean => {
+    if (how !== 'double tap') void this.mark(x, y);
+    return true;
+  };
 
   private get scale(): Scale {
     return { metres_per_unit: this.metres_per_unit_, system: this.system_.value as System };
@@ -99,10 +98,15 @@ export class MeasurePanel {
       rows.push([text.measure.height, written(rise_of(marks, up), scale)]);
     }
     if (marks.length >= 3) rows.push([text.measure.area, written(area_of(marks), scale, 2)]);
-    const cells = rows.flatMap(([name, value]) => [make('dt', {}, name), make('dd', { dir: 'ltr' }, value)]);
+    const cells = rows.flatMap(([name, value]) => [
+      make('dt', {}, name),
+      make('dd', { dir: 'ltr' }, value),
+    ]);
     const hint = scale.metres_per_unit ? [] : [make('p', {}, text.measure.no_scale)];
     this.results_.replaceChildren(
-      ...(rows.length > 0 ? [make('dl', {}, ...cells), ...hint] : [make('p', {}, text.measure.hint)]),
+      ...(rows.length > 0
+        ? [make('dl', {}, ...cells), ...hint]
+        : [make('p', {}, text.measure.hint)]),
     );
     by_id('measure-undo', HTMLButtonElement).disabled = marks.length === 0;
     by_id('measure-clear', HTMLButtonElement).disabled = marks.length === 0;
@@ -124,12 +128,14 @@ export class MeasurePanel {
   private draw(eye: Eye): void {
     if (this.marks_.length === 0 && !this.lines_.firstChild) return;
     const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
-    const places = this.marks_.map(({ point }) => place_of(point, eye, width_px / Math.max(1, height_px)));
-    const drawn = places.flatMap((place, i) => {
-      if (!place) return []; // behind the camera
-      const [x, y] = [place[0] * width_px, place[1] * height_px].map((px) => px.toFixed(1));
+    const points = this.marks_.map(({ point }) =>
+      project(point, eye, width_px / Math.max(1, height_px)),
+    );
+    const drawn = points.flatMap((at, i) => {
+      if (!at) return []; // behind the camera
+      const [x, y] = [at[0] * width_px, at[1] * height_px].map((px) => px.toFixed(1));
       const dot = shape('circle', { cx: x!, cy: y!, r: '5' });
-      const to = places[i + 1];
+      const to = points[i + 1];
       const end = to && { x2: (to[0] * width_px).toFixed(1), y2: (to[1] * height_px).toFixed(1) };
       return end ? [shape('line', { x1: x!, y1: y!, ...end }), dot] : [dot];
     });

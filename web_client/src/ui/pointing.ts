@@ -1,59 +1,60 @@
-// Pointing at places of the scene, for all in a company: by a long press, by Alt and a click, or at the middle.
+// Points at something in the scene, for all in a shared tour: by a long press, by Alt and a click, or at the middle.
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import { direction_to, place_of } from '../camera/ray';
+import { direction_to, project } from '../camera/ray';
+import type { Pointed } from '../input/pointers';
+import { by_id, make, on_click } from '../page/dom';
+import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
-import type { WorkerClient } from '../worker/client';
-import { by_id, make, on_click } from './dom';
-import type { Navigation } from './navigation';
-import type { Notice } from './notice';
-import type { SeenCamera } from './seen_camera';
 
-const { guide: words } = text;
-const long_press_ms = 600;
-const slack_px = 10; // fingers tremble
+const { pointing: words } = text;
 const shown_ms = 5000;
 const most_shown = 8;
 const edge = 0.44; // of the view's sides, from its middle
 
 interface Shown {
-  readonly place: Vec3;
+  readonly point: Vec3;
   readonly ring: HTMLElement;
 }
 
 export class Pointing {
-  private readonly button_ = by_id('company-point', HTMLButtonElement);
+  private readonly button_ = by_id('shared-tour-point', HTMLButtonElement);
   private readonly host_ = by_id('pings', HTMLElement);
-  private allowed_ = false;
-  private press_: { readonly x: number; readonly y: number; readonly timer: ReturnType<typeof setTimeout> } | undefined;
   private shown_: readonly Shown[] = [];
   private eye_: Eye | undefined; // of the picture that the visitor sees
   private picture_aspect_ = 0;
 
   constructor(
-    private readonly view_: HTMLElement,
-    private readonly worker_: WorkerClient,
-    private readonly navigation_: Navigation,
-    private readonly notice_: Notice,
-    seen: SeenCamera,
+    private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice' | 'seen'>,
   ) {
-    worker_.on('pinged', ({ place, by_leader, name }) => this.show(place, by_leader ? words.by_leader(name) : words.by_other));
-    worker_.on('config', ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)));
+    const { worker, seen } = parts_;
+    worker.on('pinged', ({ point, by_host, name }) =>
+      this.show(point, by_host ? words.by_host({ name }) : words.by_other),
+    );
+    worker.on(
+      'config',
+      ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)),
+    );
     seen.moved.listen((eye) => this.see(eye));
-    on_click('company-point', () => void this.point_at(0.5, 0.5));
-    this.bind_presses();
+    on_click('shared-tour-point', () => void this.point_at(0.5, 0.5));
   }
 
-  /** Whether this visitor may point at places now. */
+  /** Whether this visitor may point now. */
   set allowed(allowed: boolean) {
-    this.allowed_ = allowed;
+    const { gestures } = this.parts_.navigation;
     this.button_.hidden = !allowed;
-    if (!allowed) this.end_press();
+    if (allowed) gestures.set('point', this.take);
+    else gestures.remove('point');
   }
 
-  /** The camera of the leader's picture, which this visitor watches. It has its own shape, and is all in the view. */
+  private readonly take = ({ x, y, how }: Pointed): boolean => {
+    if (how === 'press') void this.point_at(x, y);
+    return how === 'press';
+  };
+
+  /** The camera of the host's picture, which this visitor watches. It has its own shape, and is all in the view. */
   watch(eye: Eye): void {
-    const { clientWidth, clientHeight } = this.view_;
+    const { clientWidth, clientHeight } = this.parts_.view;
     const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
     this.see({ ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) });
   }
@@ -63,83 +64,37 @@ export class Pointing {
     for (const shown of this.shown_) this.put(shown, eye);
   }
 
-  private bind_presses(): void {
-    const { view_: view } = this;
-    const capture = { capture: true };
-    view.addEventListener(
-      'pointerdown',
-      (event) => {
-        this.end_press();
-        if (!this.allowed_ || !event.isPrimary || event.button !== 0) return;
-        const { clientX: x, clientY: y } = event;
-        if (event.altKey) {
-          event.stopImmediatePropagation();
-          void this.point_at(...this.share_of(x, y));
-          return;
-        }
-        const timer = setTimeout(() => {
-          this.press_ = undefined;
-          // For the camera the press is over: it is no tap, too.
-          view.dispatchEvent(new PointerEvent('pointercancel', { pointerId: event.pointerId }));
-          void this.point_at(...this.share_of(x, y));
-        }, long_press_ms);
-        this.press_ = { x, y, timer };
-      },
-      capture,
-    );
-    view.addEventListener(
-      'pointermove',
-      (event) => {
-        if (!this.press_) return;
-        // Until it is a drag, the camera hears nothing of it: a follower's would leave the leader.
-        if (Math.hypot(event.clientX - this.press_.x, event.clientY - this.press_.y) > slack_px) this.end_press();
-        else event.stopImmediatePropagation();
-      },
-      capture,
-    );
-    for (const end of ['pointerup', 'pointercancel']) view.addEventListener(end, () => this.end_press(), capture);
-  }
-
-  private end_press(): void {
-    clearTimeout(this.press_?.timer);
-    this.press_ = undefined;
-  }
-
-  private share_of(x: number, y: number): [number, number] {
-    const { left, top, width, height } = this.view_.getBoundingClientRect();
-    return [(x - left) / width, (y - top) / height];
-  }
-
   private async point_at(x: number, y: number): Promise<void> {
-    const mark = await this.navigation_.hit_at(x, y);
-    if (mark) this.worker_.post({ kind: 'ping', place: mark.point });
-    else this.notice_.show(words.nothing_there, 4);
+    const mark = await this.parts_.navigation.hit_at(x, y);
+    if (mark) this.parts_.worker.post({ kind: 'ping', point: mark.point });
+    else this.parts_.notice.show(words.nothing_there, 4);
   }
 
-  private show(place: Vec3, said: string): void {
+  private show(point: Vec3, said: string): void {
     const ring = make('span', { className: 'ping' });
-    const shown = { place, ring };
+    const shown = { point, ring };
     this.shown_ = [...this.shown_, shown];
     for (const { ring: old } of this.shown_.slice(0, -most_shown)) old.remove();
     this.shown_ = this.shown_.slice(-most_shown);
     this.host_.append(ring);
-    const inside = this.put(shown, this.eye_ ?? this.navigation_.eye);
+    const inside = this.put(shown, this.eye_ ?? this.parts_.navigation.eye);
     // The ring tells all others.
-    by_id('company-said', HTMLElement).textContent = inside ? said : `${said}. ${words.aside}`;
+    by_id('shared-tour-said', HTMLElement).textContent = inside ? said : `${said}. ${words.aside}`;
     setTimeout(() => {
-      if (this.shown_[this.shown_.length - 1] === shown) by_id('company-said', HTMLElement).textContent = '';
+      if (this.shown_[this.shown_.length - 1] === shown)
+        by_id('shared-tour-said', HTMLElement).textContent = '';
       ring.remove();
       this.shown_ = this.shown_.filter((other) => other !== shown);
     }, shown_ms);
   }
 
-  /** Puts the ring where the place is, or an arrow at the edge. Returns whether the place is in the picture. */
-  private put({ place, ring }: Shown, eye: Eye): boolean {
-    const { clientWidth: width_px, clientHeight: height_px } = this.view_;
-    const at = place_of(place, eye, width_px / height_px);
+  /** Puts the ring where the point is, or an arrow at the edge. Returns whether the point is in the picture. */
+  private put({ point, ring }: Shown, eye: Eye): boolean {
+    const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
+    const at = project(point, eye, width_px / height_px);
     const inside = at !== undefined && at.every((share) => share > 0 && share < 1);
     ring.classList.toggle('aside', !inside);
-    const [right, down] = direction_to(place, eye);
+    const [right, down] = direction_to(point, eye);
     const reach = edge / Math.max(Math.abs(right), Math.abs(down), 1e-6);
     const [x, y] = inside ? at : [0.5 + right * reach, 0.5 + down * reach];
     ring.style.transform = `translate(${(x * width_px).toFixed(1)}px, ${(y * height_px).toFixed(1)}px) rotate(${inside ? 0 : Math.atan2(down, right)}rad)`;

@@ -1,5 +1,5 @@
+import { by_id } from '../page/dom';
 import { fetch_poster } from '../session/scenes';
-import { by_id } from './dom';
 
 /** Shows a still of the scene until the first picture arrives, which takes long in a queue. */
 export class Poster {

@@ -1,10 +1,10 @@
+import { by_id, on_click } from '../page/dom';
+import type { Navigation } from '../page/navigation';
 import type { WarpMode } from '../present/warp_policy';
 import type { PictureSize } from '../session/quality';
 import { factor, number } from '../text/number';
 import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
-import { by_id, on_click } from './dom';
-import type { Navigation } from './navigation';
 import type { StreamSize } from './stream_size';
 
 const degrees = 180 / Math.PI;
@@ -30,12 +30,22 @@ export class QualityPanel {
     size.addEventListener('change', chosen);
     fps.addEventListener('change', chosen);
     const warp = by_id('view-warp', HTMLSelectElement);
-    warp.addEventListener('change', () => worker.post({ kind: 'warp', mode: warp.value as WarpMode }));
-    this.fov_.addEventListener('input', () => navigation_.set_fov(this.fov_.valueAsNumber / degrees));
-    this.speed_.addEventListener('input', () => navigation_.set_speed(2 ** this.speed_.valueAsNumber));
+    warp.addEventListener('change', () =>
+      worker.post({ kind: 'warp', mode: warp.value as WarpMode }),
+    );
+    this.fov_.addEventListener('input', () =>
+      navigation_.set_fov(this.fov_.valueAsNumber / degrees),
+    );
+    this.speed_.addEventListener('input', () =>
+      navigation_.set_speed(2 ** this.speed_.valueAsNumber),
+    );
     const kept = Number(storage_?.getItem(speed_key));
     if (kept > 0) navigation_.set_speed(kept);
-    for (const [id, turns] of [['up-left', 0.25], ['up-right', -0.25], ['up-flip', 0.5]] as const) {
+    for (const [id, turns] of [
+      ['up-left', 0.25],
+      ['up-right', -0.25],
+      ['up-flip', 0.5],
+    ] as const) {
       on_click(id, () => navigation_.turn_up(turns * 2 * Math.PI));
     }
     on_click('up-surface', () => void this.stand_here());
@@ -51,7 +61,11 @@ export class QualityPanel {
   private show(): void {
     const fov_y_deg = Math.round(this.navigation_.camera.fov_y_rad * degrees);
     this.fov_.value = String(fov_y_deg);
-    this.fov_value_.textContent = number(fov_y_deg, { style: 'unit', unit: 'degree', unitDisplay: 'narrow' });
+    this.fov_value_.textContent = number(fov_y_deg, {
+      style: 'unit',
+      unit: 'degree',
+      unitDisplay: 'narrow',
+    });
     const { speed } = this.navigation_.camera;
     this.speed_.value = String(Math.log2(speed));
     this.speed_value_.textContent = factor(speed);

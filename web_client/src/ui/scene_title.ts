@@ -1,13 +1,13 @@
+import { by_id, make } from '../page/dom';
 import { credit_line, scene_address } from '../session/scenes';
 import { number } from '../text/number';
 import { text } from '../text/text';
 import type { SceneFacts } from '../wire/wire';
-import { by_id, make } from './dom';
 
 /** Shows the name of the scene and whom it is from. `several`: this visitor may see other scenes, too. */
 export function show_scene_title(scene: SceneFacts, several: boolean): void {
   const name = scene.title || scene.sceneId;
-  const count = text.scene.gaussians(number(scene.gaussians));
+  const count = text.scene.gaussians({ count: number(scene.gaussians) });
   const what = scene.model === '' ? count : `${count}, ${scene.model}`;
   by_id('scene-name', HTMLElement).replaceChildren(make('bdi', {}, name), make('small', {}, what));
   by_id('scene-credits', HTMLElement).textContent = credit_line(scene);

@@ -1,10 +1,10 @@
+import type { Toolbar } from '../page/toolbar';
 import { list_scenes, type SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
 import type { AccessToken } from '../session/token';
 import { Error_Code } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
-import type { Toolbar } from './toolbar';
 import { broken_card, card_for } from './wording';
 
 const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards
@@ -49,12 +49,15 @@ export class SessionStatus {
   private changed(state: SessionState): void {
     this.state_ = state;
     if (state.phase !== 'connecting' || state.attempt > 0) this.show();
-    if (state.phase === 'failed' && state.code === Error_Code.UNKNOWN_SCENE) void this.offer_scenes();
+    if (state.phase === 'failed' && state.code === Error_Code.UNKNOWN_SCENE)
+      void this.offer_scenes();
   }
 
   private show(): void {
     if (this.broken_) return;
-    this.card_.show(card_for(this.state_, this.has_picture_, this.scenes_, this.token_.value !== ''));
+    this.card_.show(
+      card_for(this.state_, this.has_picture_, this.scenes_, this.token_.value !== ''),
+    );
     this.toolbar_.set_active(this.state_.phase !== 'failed');
     document.body.classList.toggle('stale', this.has_picture_ && this.state_.phase !== 'live');
   }

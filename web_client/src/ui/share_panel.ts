@@ -1,16 +1,8 @@
+import { by_id, make, on_click, save_file } from '../page/dom';
+import type { PageParts } from '../page/parts';
+import { file_name_of } from '../session/scenes';
 import { text as words } from '../text/text';
 import { embed_code, frame_sites } from '../tour/share';
-import type { Snapshot } from '../worker/messages';
-import { by_id, make, on_click, save_file } from './dom';
-
-interface ShareSource {
-  address(): string;
-  snapshot(): Promise<Snapshot | undefined>;
-  /** Name for files. */
-  name(): string;
-  /** Whether this page uses an access token. */
-  has_token(): boolean;
-}
 
 /** The panel with a link, code for other pages, and a picture to save. */
 export class SharePanel {
@@ -19,20 +11,27 @@ export class SharePanel {
   private readonly token_ = by_id('share-token', HTMLElement);
   private readonly frames_ = by_id('share-frames', HTMLElement);
 
-  constructor(private readonly source_: ShareSource) {
-    on_click('share-copy', () => void this.hand_over(source_.address(), words.share.link_copied));
+  /** `address`: a link to the present view. */
+  constructor(
+    private readonly parts_: Pick<PageParts, 'worker' | 'navigation' | 'toolbar' | 'token'>,
+    private readonly address_: () => string,
+  ) {
+    on_click('share-copy', () => void this.hand_over(address_(), words.share.link_copied));
     on_click('share-embed', () => {
-      void this.hand_over(embed_code(source_.address()), words.share.code_copied);
+      void this.hand_over(embed_code(address_()), words.share.code_copied);
       void this.tell_of_frames();
     });
     on_click('share-picture', () => void this.save_picture());
     this.link_.addEventListener('focus', () => this.link_.select());
+    parts_.toolbar.panel_shown.listen(({ panel, shown }) => {
+      if (panel === 'share' && shown) this.show();
+    });
   }
 
-  shown(): void {
-    this.link_.value = this.source_.address();
+  private show(): void {
+    this.link_.value = this.address_();
     this.done_.textContent = '';
-    this.token_.hidden = !this.source_.has_token();
+    this.token_.hidden = this.parts_.token.value === '';
     this.frames_.hidden = true;
   }
 
@@ -44,7 +43,9 @@ export class SharePanel {
       this.frames_.hidden = sites === undefined;
       if (sites) {
         this.frames_.textContent =
-          sites.length === 0 ? words.share.no_frames : words.share.frames(sites.join(', '));
+          sites.length === 0
+            ? words.share.no_frames
+            : words.share.frames({ sites: sites.join(', ') });
       }
     } catch (error) {
       console.warn('the server did not say who may show this page', error); // the server is away
@@ -66,12 +67,12 @@ export class SharePanel {
   }
 
   private async save_picture(): Promise<void> {
-    const snapshot = await this.source_.snapshot();
+    const snapshot = await this.parts_.worker.snapshot();
     if (!snapshot) return;
     const { width_px, height_px, rgba } = snapshot;
     const canvas = make('canvas', { width: width_px, height: height_px });
     canvas.getContext('2d')?.putImageData(new ImageData(rgba, width_px, height_px), 0, 0);
     const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
-    if (blob) save_file(blob, `${this.source_.name()}.png`);
+    if (blob) save_file(blob, `${file_name_of(this.parts_.navigation.scene_id)}.png`);
   }
 }

@@ -2,11 +2,11 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 import { sum } from '../base/time_window';
+import { make } from '../page/dom';
 import type { StatsHistory } from '../stats/history';
 import { stages, type Stage, type StatsSnapshot } from '../stats/metrics';
 import { number } from '../text/number';
-import { text } from '../text/text';
-import { make } from './dom';
+import { operator } from '../text/operator';
 
 /** For both light and dark pages. */
 const colours: Readonly<Record<Stage, string>> = {
@@ -25,12 +25,11 @@ function style(element: Element, name: string): string {
   return getComputedStyle(element).getPropertyValue(name).trim();
 }
 
-/** Colours come from the page's style sheet, light or dark. */
+/** Colours come from the page's style sheet at each drawing, because it may turn light or dark. */
 function axis(host: Element, label: string, more: Partial<uPlot.Axis> = {}): uPlot.Axis {
-  const line = style(host, '--line');
   return {
-    stroke: style(host, '--ink-soft'),
-    grid: { stroke: line, width: 1 },
+    stroke: () => style(host, '--ink-soft'),
+    grid: { stroke: () => style(host, '--line'), width: 1 },
     ticks: { show: false },
     font: '11px system-ui, sans-serif',
     size: 34,
@@ -48,7 +47,7 @@ const time_axis = (host: Element): uPlot.Axis =>
     size: 18,
     gap: 2,
     labelSize: 0,
-    values: (_, ticks) => ticks.map((s) => `${number(s)} ${text.units.seconds}`),
+    values: (_, ticks) => ticks.map((s) => `${number(s)} ${operator.units.seconds}`),
   });
 
 const line = (label: string, stroke: string, scale: string): uPlot.Series => ({
@@ -69,6 +68,9 @@ export class StatsCharts {
 
   constructor(private readonly host_: HTMLElement) {
     this.charts_ = [this.latency(), this.rates()];
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+      for (const { plot } of this.charts_) plot.redraw();
+    });
     new ResizeObserver(() => {
       const width = this.width();
       for (const { plot } of this.charts_) plot.setSize({ width, height: height_px });
@@ -88,12 +90,20 @@ export class StatsCharts {
     const up_to =
       (last: Stage) =>
       ({ stages_ms }: StatsSnapshot): number =>
-        sum(stages.slice(0, stages.indexOf(last) + 1).map((stage) => stages_ms[stage]).filter(Number.isFinite));
+        sum(
+          stages
+            .slice(0, stages.indexOf(last) + 1)
+            .map((stage) => stages_ms[stage])
+            .filter(Number.isFinite),
+        );
     return {
       plot: this.plot(
-        text.plots.latency,
-        drawn.map((stage) => ({ ...line(text.stages[stage].label, colours[stage], 'y'), fill: colours[stage] })),
-        [axis(this.host_, text.units.milliseconds)],
+        operator.plots.latency,
+        drawn.map((stage) => ({
+          ...line(operator.stages[stage].label, colours[stage], 'y'),
+          fill: colours[stage],
+        })),
+        [axis(this.host_, operator.units.milliseconds)],
       ),
       data: (history) => drawn.map((stage) => history.column(up_to(stage))),
     };
@@ -103,11 +113,21 @@ export class StatsCharts {
   private rates(): Chart {
     return {
       plot: this.plot(
-        text.plots.rates,
-        [line(text.plots.fps, '#4b7bd6', 'y'), line(text.plots.bitrate, '#e07a3f', 'bits')],
-        [axis(this.host_, text.units.fps), axis(this.host_, text.units.megabits, { side: 1, scale: 'bits', grid: { show: false } })],
+        operator.plots.rates,
+        [line(operator.plots.fps, '#4b7bd6', 'y'), line(operator.plots.bitrate, '#e07a3f', 'bits')],
+        [
+          axis(this.host_, operator.units.fps),
+          axis(this.host_, operator.units.megabits, {
+            side: 1,
+            scale: 'bits',
+            grid: { show: false },
+          }),
+        ],
       ),
-      data: (history) => [history.column((s) => s.fps_shown), history.column((s) => s.bitrate_kbps / 1000)],
+      data: (history) => [
+        history.column((s) => s.fps_shown),
+        history.column((s) => s.bitrate_kbps / 1000),
+      ],
     };
   }
 

@@ -1,13 +1,13 @@
+import { by_id, make, save_file } from '../page/dom';
+import type { Toolbar } from '../page/toolbar';
 import type { Sides } from '../present/warp';
 import { StatsHistory } from '../stats/history';
 import type { StatsReport } from '../stats/metrics';
 import { number } from '../text/number';
-import { text } from '../text/text';
+import { operator } from '../text/operator';
 import type { WorkerClient } from '../worker/client';
-import { by_id, make, save_file } from './dom';
 import type { StatsCharts } from './stats_charts';
 import { rest_note, row_texts, slowest_stage, stats_rows } from './stats_rows';
-import type { Toolbar } from './toolbar';
 
 const interval_ms = 250;
 
@@ -21,7 +21,7 @@ export class StatsPanel {
   private facts_: Facts = { renderer: '', encoder: '', presenter: '', server_version: '' };
   private readonly history_ = new StatsHistory();
   private readonly rest_ = make('p', { hidden: true });
-  private readonly plots_ = make('div', { className: 'plots', dir: 'ltr' });
+  private readonly plots_ = make('div', { className: 'plots' });
   private readonly about_ = make('dl');
   private charts_: StatsCharts | undefined;
   private opened_ = false;
@@ -37,14 +37,29 @@ export class StatsPanel {
       list.append(make('dt', { title: title ?? '' }, label), make('dd', {}, value));
       this.values_.push(value);
     }
-    const save = make('button', { type: 'button', onclick: () => this.save() }, text.stats.save);
-    by_id('stats-panel', HTMLElement).append(this.rest_, list, this.plots_, this.about_, save);
+    const save = make(
+      'button',
+      { type: 'button', onclick: () => this.save() },
+      operator.stats.save,
+    );
+    const in_english = make(
+      'div',
+      { lang: 'en', dir: 'ltr' },
+      this.rest_,
+      list,
+      this.plots_,
+      this.about_,
+      save,
+    );
+    by_id('stats-panel', HTMLElement).append(in_english);
     worker_.on('welcome', ({ welcome }) => {
       this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
     });
     worker_.on('config', ({ config }) => this.show_facts({ encoder: config.encoder }));
     worker_.on('presenter', ({ presenter, warp, overscan }) => {
-      this.show_facts({ presenter: `${text.presenters[presenter]} · ${text.warp[warp]}${overscan_text(overscan)}` });
+      this.show_facts({
+        presenter: `${operator.presenters[presenter]} · ${operator.warp[warp]}${overscan_text(overscan)}`,
+      });
     });
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'stats') this.watch(shown);
@@ -55,7 +70,7 @@ export class StatsPanel {
     this.facts_ = { ...this.facts_, ...known };
     this.about_.replaceChildren(
       ...facts.flatMap((fact) => [
-        make('dt', {}, text.stats[fact]),
+        make('dt', {}, operator.stats[fact]),
         make('dd', { className: 'reason', dir: 'auto' }, this.facts_[fact]),
       ]),
     );
@@ -109,5 +124,7 @@ export class StatsPanel {
 /** Shares of the view by which pictures are larger; empty where they are not. */
 function overscan_text({ x, y }: Sides): string {
   const percent = (side: number): string => number(side - 1, { style: 'percent' });
-  return x === 1 && y === 1 ? '' : ` · ${text.warp.overscan(percent(x), percent(y))}`;
+  return x === 1 && y === 1
+    ? ''
+    : ` · ${operator.warp.overscan({ width: percent(x), height: percent(y) })}`;
 }

@@ -1,7 +1,13 @@
 // Texts of the statistics overlay. Pure.
-import { stages, type PagesDrawn, type Stage, type StatsReport, type StatsSnapshot } from '../stats/metrics';
+import {
+  stages,
+  type PagesDrawn,
+  type Stage,
+  type StatsReport,
+  type StatsSnapshot,
+} from '../stats/metrics';
 import { decimals, number } from '../text/number';
-import { text } from '../text/text';
+import { operator } from '../text/operator';
 
 interface Row {
   readonly label: string;
@@ -10,7 +16,7 @@ interface Row {
   readonly stage?: Stage;
 }
 
-const { units } = text;
+const { units, stats: words } = operator;
 const nothing = '–';
 
 /** Formats with `digits` decimals. Gives one dash for all values when one of them was not measured. */
@@ -21,28 +27,36 @@ function measured(values: readonly number[], digits: number, unit: string): stri
 
 const pixels = (count: number): string => number(count, { useGrouping: false });
 
-function detail({ detail_px, coarsest_px, gaussians, finest_level, coarsest_level, missing_pages }: PagesDrawn): string {
-  const words = text.stats;
+function detail({
+  detail_px,
+  coarsest_px,
+  gaussians,
+  finest_level,
+  coarsest_level,
+  missing_pages,
+}: PagesDrawn): string {
   const px = Math.max(detail_px, coarsest_px);
   const [finest, coarsest] = [number(finest_level), number(coarsest_level)];
   return [
     `${px < 100 ? decimals(px, 1) : `> ${number(100)}`} ${units.pixels}`,
     number(gaussians, { notation: 'compact', maximumFractionDigits: 2 }),
-    finest === coarsest ? words.level(finest) : words.levels(finest, coarsest),
-    ...(missing_pages === 0 ? [] : [words.pages_missing(missing_pages, number(missing_pages))]),
+    finest === coarsest ? words.level({ level: finest }) : words.levels({ finest, coarsest }),
+    ...(missing_pages === 0 ? [] : [words.pages_missing({ count: missing_pages })]),
   ].join(' · ');
 }
 
 const stage_row = (stage: Stage): Row => ({
-  label: text.stages[stage].label,
-  title: text.stats.stage_title + text.stages[stage].title,
+  label: operator.stages[stage].label,
+  title: words.stage_title + operator.stages[stage].title,
   text: ({ stages_ms }) => measured([stages_ms[stage]], 1, units.milliseconds),
   stage,
 });
 
 /** The stage that takes most of a frame's time; undefined before a measurement. */
 export function slowest_stage(stages_ms: StatsSnapshot['stages_ms']): Stage | undefined {
-  return stages.filter((stage) => stages_ms[stage] > 0).sort((a, b) => stages_ms[b] - stages_ms[a])[0];
+  return stages
+    .filter((stage) => stages_ms[stage] > 0)
+    .sort((a, b) => stages_ms[b] - stages_ms[a])[0];
 }
 
 /** Gives a dash before the first picture. */
@@ -52,32 +66,37 @@ const once_shown =
     stats.frames_shown > 0 ? value(stats) : nothing;
 
 export const stats_rows: readonly Row[] = [
-  { label: text.stats.shown, text: once_shown((s) => measured([s.fps_shown], 1, units.fps)) },
+  { label: words.shown, text: once_shown((s) => measured([s.fps_shown], 1, units.fps)) },
   {
-    label: text.stats.motion,
-    title: text.stats.motion_title,
+    label: words.motion,
+    title: words.motion_title,
     text: ({ motion_to_photon_ms: t }) => measured([t.p50, t.p95], 0, units.milliseconds),
   },
   {
-    label: text.stats.age,
-    title: text.stats.age_title,
+    label: words.age,
+    title: words.age_title,
     text: ({ pose_age_ms: t }) => measured([t.p50, t.p95], 0, units.milliseconds),
   },
   {
-    label: text.stats.bitrate,
+    label: words.bitrate,
     text: once_shown((s) => measured([s.bitrate_kbps / 1000], 2, units.megabits)),
   },
   ...stages.map(stage_row),
-  { label: text.stats.picture, text: once_shown((s) => `${pixels(s.width_px)} × ${pixels(s.height_px)}`) },
   {
-    label: text.stats.detail,
-    title: text.stats.detail_title,
+    label: words.picture,
+    text: once_shown((s) => `${pixels(s.width_px)} × ${pixels(s.height_px)}`),
+  },
+  {
+    label: words.detail,
+    title: words.detail_title,
     text: ({ pages }) => (pages === undefined ? nothing : detail(pages)),
   },
   {
-    label: text.stats.drops,
-    title: text.stats.drops_title,
-    text: once_shown((s) => text.stats.drops_value(number(s.frames_dropped), number(s.packets_dropped))),
+    label: words.drops,
+    title: words.drops_title,
+    text: once_shown((s) =>
+      words.drops_value({ here: s.frames_dropped, server: s.packets_dropped }),
+    ),
   },
 ];
 
@@ -94,5 +113,5 @@ export function row_texts(stats: StatsReport): { readonly text: string; readonly
 /** Says why some rows are paler or empty; empty while the camera moves. */
 export function rest_note({ frames_shown, stages_ms, last_motion }: StatsReport): string {
   if (frames_shown === 0 || Number.isFinite(stages_ms.render)) return '';
-  return Number.isFinite(last_motion.stages_ms.render) ? text.stats.at_rest : text.stats.not_moved;
+  return Number.isFinite(last_motion.stages_ms.render) ? words.at_rest : words.not_moved;
 }

@@ -1,11 +1,10 @@
 import { CaptionView, prepare } from '../captions/caption';
 import { is_for_page } from '../input/view_input';
-import { number } from '../text/number';
+import { by_id, hint_at_more, on_click } from '../page/dom';
 import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
-import type { Stop, Tour } from '../tour/tour';
-import { by_id, hint_at_more, on_click } from './dom';
-import type { Doors } from './doors';
+import type { Portal, Stop, Tour } from '../tour/tour';
+import type { PortalScenes } from './portal_scenes';
 
 /** The card of a tour: caption, buttons and keys. */
 export class TourView {
@@ -19,11 +18,13 @@ export class TourView {
 
   constructor(
     player: TourPlayer,
-    private readonly doors_: Doors,
+    private readonly scenes_: PortalScenes,
+    take: (portal: Portal, scene_id: string) => void,
   ) {
     this.portal_.addEventListener('click', () => {
-      const { stop } = player.state;
-      if (stop?.portal) doors_.enter(stop.portal);
+      const portal = player.state.stop?.portal;
+      const scene_id = portal && scenes_.target_of(portal).scene_id;
+      if (portal && scene_id) take(portal, scene_id);
     });
     on_click('tour-previous', () => player.previous());
     on_click('tour-next', () => player.next());
@@ -35,7 +36,12 @@ export class TourView {
       Space: () => player.toggle(),
     };
     window.addEventListener('keydown', (event) => {
-      if (event.code === 'Space' && event.target instanceof Element && event.target.closest('button, summary')) return; // a click
+      if (
+        event.code === 'Space' &&
+        event.target instanceof Element &&
+        event.target.closest('button, summary')
+      )
+        return; // a click
       const action = actions[event.code];
       if (!action || !this.has_tours_ || !is_for_page(event)) return;
       event.preventDefault();
@@ -49,7 +55,9 @@ export class TourView {
     this.card_.hidden = !this.has_tours_;
     this.choice_.hidden = tours.length < 2;
     this.choice_.replaceChildren(
-      ...tours.map(({ title }, i) => new Option(title || text.tour.numbered(number(i + 1)), String(i))),
+      ...tours.map(
+        ({ title }, i) => new Option(title || text.tour.numbered({ n: i + 1 }), String(i)),
+      ),
     );
   }
 
@@ -65,8 +73,12 @@ export class TourView {
     this.text_.lang = stop?.language ?? '';
     this.text_.scrollTop = 0;
     this.show_portal(stop);
-    by_id('tour-place', HTMLElement).textContent =
-      count === 0 ? '' : stop_index === undefined ? text.tour.stops(count, number(count)) : text.tour.place(number(stop_index + 1), number(count));
+    by_id('tour-position', HTMLElement).textContent =
+      count === 0
+        ? ''
+        : stop_index === undefined
+          ? text.tour.stops({ count })
+          : text.tour.position({ n: stop_index + 1, count });
     for (const id of ['tour-previous', 'tour-next']) {
       by_id(id, HTMLButtonElement).hidden = count < 2;
     }
@@ -78,13 +90,15 @@ export class TourView {
   }
 
   private show_portal(stop: Stop | undefined): void {
-    const door = stop?.portal && this.doors_.behind(stop.portal);
-    const is_closed = door !== undefined && door.scene_id === undefined;
-    this.portal_.hidden = door === undefined;
+    const target = stop?.portal && this.scenes_.target_of(stop.portal);
+    const is_closed = target !== undefined && target.scene_id === undefined;
+    this.portal_.hidden = target === undefined;
     this.portal_.disabled = is_closed;
-    by_id('tour-portal-text', HTMLElement).textContent = door ? text.portals.to(door.title) : '';
+    by_id('tour-portal-text', HTMLElement).textContent = target
+      ? text.portals.to({ scene: target.title })
+      : '';
     const closed = by_id('tour-closed', HTMLElement);
     closed.hidden = !is_closed;
-    closed.textContent = is_closed ? text.portals.closed(door.title) : '';
+    closed.textContent = is_closed ? text.portals.closed({ scene: target.title }) : '';
   }
 }

@@ -1,21 +1,21 @@
+import type { Notice } from '../page/notice';
 import type { SessionState } from '../session/state';
 import { text } from '../text/text';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
-import type { Notice } from './notice';
 
 const tones_hz = [660, 880] as const;
 const tone_s = 0.18;
 const loudness = 0.2;
 
 /**
- * Calls visitors who wait for a place and look elsewhere meanwhile. The title of the tab has their place in
+ * Calls visitors who wait for a slot and look elsewhere meanwhile. The title of the tab has their position in
  * the queue, and then says that it is their turn. Who asked for it hears two tones, too, and gets a
  * notification.
  */
 export class TurnCall {
   private waits_ = false;
-  private lead_ = ''; // what stands before the page's own title
+  private prefix_ = ''; // of the page's own title
   private sound_: AudioContext | undefined; // undefined: nobody asked to be called
 
   constructor(
@@ -26,7 +26,7 @@ export class TurnCall {
     worker.on('state', ({ state }) => this.changed(state));
     card_.call_wanted.listen(() => this.prepare());
     const seen = (): void => {
-      if (!this.waits_ && this.is_seen()) this.lead('');
+      if (!this.waits_ && this.is_seen()) this.set_prefix('');
     };
     document.addEventListener('visibilitychange', seen);
     window.addEventListener('focus', seen);
@@ -35,14 +35,14 @@ export class TurnCall {
   private changed(state: SessionState): void {
     if (state.phase === 'queued' && !state.for_scene) {
       this.waits_ = true;
-      this.lead(`(${state.position}) `);
+      this.set_prefix(`(${state.position}) `);
     } else if (state.phase === 'live' && this.waits_) {
       this.waits_ = false;
       this.call();
     } else if (state.phase === 'failed') {
       this.waits_ = false;
       this.hang_up();
-      this.lead('');
+      this.set_prefix('');
     }
   }
 
@@ -53,12 +53,14 @@ export class TurnCall {
     this.notice_.show(text.turn.will_call, 10);
     const permission = globalThis.Notification as typeof Notification | undefined;
     if (permission?.permission === 'default') {
-      permission.requestPermission().catch((error: unknown) => console.warn('no notifications', error));
+      permission
+        .requestPermission()
+        .catch((error: unknown) => console.warn('no notifications', error));
     }
   }
 
   private call(): void {
-    this.lead(this.is_seen() ? '' : text.turn.in_title);
+    this.set_prefix(this.is_seen() ? '' : text.turn.in_title);
     this.notice_.show(text.turn.now, 10);
     if (!this.sound_) return;
     this.sound();
@@ -100,9 +102,11 @@ export class TurnCall {
     return !document.hidden && document.hasFocus();
   }
 
-  private lead(lead: string): void {
-    const own = document.title.startsWith(this.lead_) ? document.title.slice(this.lead_.length) : document.title;
-    this.lead_ = lead;
-    document.title = lead + own;
+  private set_prefix(prefix: string): void {
+    const own = document.title.startsWith(this.prefix_)
+      ? document.title.slice(this.prefix_.length)
+      : document.title;
+    this.prefix_ = prefix;
+    document.title = prefix + own;
   }
 }

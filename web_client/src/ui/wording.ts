@@ -2,7 +2,7 @@
 import type { DecoderRung } from '../decode/ladder';
 import type { SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
-import { duration, list, number } from '../text/number';
+import { duration, list } from '../text/number';
 import { text } from '../text/text';
 import { Error_Code } from '../wire/wire';
 
@@ -12,7 +12,7 @@ export interface Card {
   readonly title: string;
   readonly text: string;
   readonly time?: string; // how long it takes: it changes all the time, so it is not read out
-  readonly busy?: boolean; // the page goes on by itself
+  readonly busy?: boolean; // the page continues by itself
   readonly action?: {
     readonly label: string;
     readonly does: 'retry' | 'reload' | 'open' | 'call' | 'look';
@@ -43,23 +43,32 @@ export function card_for(
       const time = duration(state.estimate_s);
       const { loading_scene, queue } = cards;
       return state.for_scene
-        ? { title: loading_scene.title, text: loading_scene.text, time: loading_scene.time(time), busy: true }
+        ? {
+            title: loading_scene.title,
+            text: loading_scene.text,
+            time: loading_scene.time({ time }),
+            busy: true,
+          }
         : {
-            title: queue.title(number(state.position)),
+            title: queue.title({ position: state.position }),
             text: queue.text,
-            time: queue.time(time),
+            time: queue.time({ time }),
             busy: true,
             action: { label: actions.call, does: 'call' },
           };
     }
     case 'waiting':
-      if (state.cause === 'no_leader') {
-        return { title: cards.waiting.no_leader, text: text.together.comes_by_itself, busy: true };
+      if (state.cause === 'no_host') {
+        return {
+          title: cards.waiting.no_host,
+          text: text.shared_tour.appears_by_itself,
+          busy: true,
+        };
       }
       return {
         title: cards.waiting[state.cause],
         text: sentence(state.message).trim(),
-        time: cards.trying_again(duration(state.retry_in_ms / 1000)),
+        time: cards.trying_again({ time: duration(state.retry_in_ms / 1000) }),
         busy: true,
         action: { label: actions.now, does: 'retry' },
       };
@@ -68,7 +77,12 @@ export function card_for(
   }
 }
 
-function failed_card(code: Error_Code, message: string, scenes: readonly SceneListing[], has_token: boolean): Card {
+function failed_card(
+  code: Error_Code,
+  message: string,
+  scenes: readonly SceneListing[],
+  has_token: boolean,
+): Card {
   const retry = { label: actions.retry, does: 'retry' } as const;
   const said = ({ title, text }: { title: string; text: string }): Card => ({
     title,
@@ -78,7 +92,9 @@ function failed_card(code: Error_Code, message: string, scenes: readonly SceneLi
   switch (code) {
     case Error_Code.UNAUTHORIZED:
       return {
-        ...{ title: cards.unauthorized, text: sentence(message).trim(), asks_token: true },
+        title: cards.unauthorized,
+        text: sentence(message).trim(),
+        asks_token: true,
         ...(has_token && { action: { label: actions.look, does: 'look' } }),
       };
     case Error_Code.UNKNOWN_SCENE:
@@ -104,7 +120,7 @@ function unknown_scene_card(message: string, scenes: readonly SceneListing[]): C
     title,
     text: sentence(message) + check,
     action: {
-      label: first === undefined ? actions.open_first : actions.open(first.title),
+      label: first === undefined ? actions.open_first : actions.open({ scene_id: first.title }),
       does: 'open',
       scene_id: first?.id ?? '',
     },
@@ -127,17 +143,17 @@ export function unsupported_card(
   const lacking = (['Worker', 'OffscreenCanvas', 'WebSocket'] as const).filter((f) => !scope[f]);
   if (lacking.length === 0) return undefined;
   const { title, text } = cards.unsupported;
-  return { title, text: text(list(lacking)) };
+  return { title, text: text({ lacking: list(lacking) }) };
 }
 
-/** Says why pictures come as JPEG and not as video; undefined when they come as video. */
+/** Why pictures come as JPEG and not as video, as a key of the console's texts; undefined when they come as video. */
 export function jpeg_reason(
   has_webcodecs: boolean,
   is_secure: boolean,
   rung: DecoderRung,
-): string | undefined {
-  if (has_webcodecs) return rung === 'jpeg' ? text.jpeg.failed_lately : undefined;
-  return is_secure ? text.jpeg.no_decoder : text.jpeg.not_secure;
+): 'failed_recently' | 'no_decoder' | 'not_secure' | undefined {
+  if (has_webcodecs) return rung === 'jpeg' ? 'failed_recently' : undefined;
+  return is_secure ? 'no_decoder' : 'not_secure';
 }
 
 function sentence(said: string): string {

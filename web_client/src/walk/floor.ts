@@ -11,14 +11,23 @@ const wall_cells = 40; // of height: a wall is taken to reach over a visitor's h
 const furniture_cells = 8;
 
 /** What a ray meets between two heights of a column: its ground, or something in the way. */
-function met_in(map: WalkMap, column: number, row: number, low: number, high: number): number | 'blocked' | undefined {
+function met_in(
+  map: WalkMap,
+  column: number,
+  row: number,
+  low: number,
+  high: number,
+): number | 'blocked' | undefined {
   const places = places_at(map, column, row);
   for (let i = places.length - 1; i >= 0; --i) {
     const height = height_of(places[i]!);
     const kind = kind_of(places[i]!);
     if (kind === Kind.clear || kind === Kind.near) {
       if (low <= height && high >= height - map.step) return height;
-    } else if (low <= height + (kind === Kind.obstacle ? wall_cells : furniture_cells) && high >= height) {
+    } else if (
+      low <= height + (kind === Kind.obstacle ? wall_cells : furniture_cells) &&
+      high >= height
+    ) {
       return 'blocked';
     }
   }
@@ -37,14 +46,17 @@ export function floor_along(map: WalkMap, ray: Ray): Stand | undefined {
   let [column, row] = [Math.floor(x0), Math.floor(y0)];
   // From column to column (Amanatides and Woo 1987). Lengths are those along the ray, in cells.
   const to_border = (at: number, direction: number): number =>
-    direction === 0 ? Infinity : ((direction > 0 ? Math.floor(at) + 1 : Math.floor(at)) - at) / direction;
+    direction === 0
+      ? Infinity
+      : ((direction > 0 ? Math.floor(at) + 1 : Math.floor(at)) - at) / direction;
   let [next_x, next_y] = [to_border(x0, dx), to_border(y0, dy)];
   for (let from = 0; from * flat <= farthest_cells; ) {
     const to = Math.min(next_x, next_y, from + farthest_cells);
     const [a, b] = [z0 + dz * from, z0 + dz * to];
     const met = met_in(map, column, row, Math.min(a, b), Math.max(a, b));
     if (met === 'blocked') {
-      const near = last && Math.hypot(last.east - column - 0.5, last.north - row - 0.5) <= before_wall_cells;
+      const near =
+        last && Math.hypot(last.east - column - 0.5, last.north - row - 0.5) <= before_wall_cells;
       return near ? last : undefined;
     }
     if (met !== undefined) {
@@ -66,7 +78,12 @@ export function floor_along(map: WalkMap, ray: Ray): Stand | undefined {
   return undefined;
 }
 
-function clear_below(map: WalkMap, column: number, row: number, height: number): number | undefined {
+function clear_below(
+  map: WalkMap,
+  column: number,
+  row: number,
+  height: number,
+): number | undefined {
   const place = places_at(map, column, row).findLast((at) => height_of(at) <= height);
   return place !== undefined && kind_of(place) === Kind.clear ? height_of(place) : undefined;
 }

@@ -1,25 +1,30 @@
 // A visitor who walks on a WalkMap.
 import { dot, scale, add, type Vec3 } from '../base/vector';
-import type { Ground } from '../camera/ground';
+import type { Walker } from '../camera/walker';
 import { height_of } from './tiles';
 import { cells_per_eye_height, clear_at, eyes_of, type Stand, type WalkMap } from './walk_map';
 import { move, stand_below } from './walker';
 
 const farthest_cells = 96;
 
-/** The clear ground nearest to a column, below `place`; undefined where none is near. World units. */
-function stand_around(map: WalkMap, place: Vec3): Stand | undefined {
-  const here = stand_below(map, place);
+/** The clear ground nearest to a column, below `point`; undefined where none is near. World units. */
+function stand_around(map: WalkMap, point: Vec3): Stand | undefined {
+  const here = stand_below(map, point);
   if (here) return here;
   const [east, north] = map.axes;
   for (let r = 1; r <= farthest_cells; ++r) {
     let best: Stand | undefined;
     let nearest = Infinity;
     for (let k = -r; k < r; ++k)
-      for (const [x, y] of [[k, -r], [r, k], [-k, r], [-r, -k]] as const) {
+      for (const [x, y] of [
+        [k, -r],
+        [r, k],
+        [-k, r],
+        [-r, -k],
+      ] as const) {
         const distance = Math.hypot(x, y);
         if (distance >= nearest) continue;
-        const beside = add(place, add(scale(east, x * map.cell), scale(north, y * map.cell)));
+        const beside = add(point, add(scale(east, x * map.cell), scale(north, y * map.cell)));
         const stand = stand_below(map, beside);
         if (stand) [best, nearest] = [stand, distance];
       }
@@ -41,12 +46,15 @@ export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | 
       if (place < 0) continue;
       nearest = distance;
       const height = height_of(place);
-      best = distance === 0 ? { ...stand, height } : { east: column + x + 0.5, north: row + y + 0.5, height };
+      best =
+        distance === 0
+          ? { ...stand, height }
+          : { east: column + x + 0.5, north: row + y + 0.5, height };
     }
   return best;
 }
 
-export class MapWalker implements Ground {
+export class MapWalker implements Walker {
   readonly eye_height: number;
   private stand_: Stand;
 
@@ -68,7 +76,12 @@ export class MapWalker implements Ground {
   walk(movement: Vec3): Vec3 {
     const [east, north] = this.map.axes;
     const { cell } = this.map;
-    this.stand_ = move(this.map, this.stand_, dot(movement, east) / cell, dot(movement, north) / cell);
+    this.stand_ = move(
+      this.map,
+      this.stand_,
+      dot(movement, east) / cell,
+      dot(movement, north) / cell,
+    );
     return eyes_of(this.map, this.stand_);
   }
 }

@@ -1,4 +1,4 @@
-// Short paths on a WalkMap (A*, Hart, Nilsson and Raphael 1968), for a tap on a place to go to.
+// Short paths on a WalkMap (A*, Hart, Nilsson and Raphael 1968), for a tap on a point to go to.
 import { Breaths } from '../base/breaths';
 import { column_in_tile, height_of, require, tile_at, tiles_in, type Tile } from './tiles';
 import { clear_in, type Stand, type WalkMap } from './walk_map';
@@ -126,7 +126,12 @@ class Search {
  * than the shortest. It begins with `from`. Empty where there is none, or where it is not `wanted` any more. While the
  * search runs, it keeps the tiles that it came to, takes 15 bytes for each place of the map, and lets the page draw.
  */
-export async function find_path(map: WalkMap, from: Stand, to: Stand, wanted = (): boolean => true): Promise<Stand[]> {
+export async function find_path(
+  map: WalkMap,
+  from: Stand,
+  to: Stand,
+  wanted = (): boolean => true,
+): Promise<Stand[]> {
   const search = new Search(map);
   const { state, cost, before } = search;
   const goal = [Math.floor(to.east), Math.floor(to.north)] as const;
@@ -155,7 +160,11 @@ export async function find_path(map: WalkMap, from: Stand, to: Stand, wanted = (
     const node = open.pop();
     if (state[node] === State.done) continue;
     state[node] = State.done;
-    const [column, row, height] = [search.column_of(node), search.row_of(node), search.height_of(node)];
+    const [column, row, height] = [
+      search.column_of(node),
+      search.row_of(node),
+      search.height_of(node),
+    ];
     for (let side = 0; side < 4; ++side) {
       const [x, y] = sides[side]!;
       beside[side] = search.node_at(column + x, row + y, height);
@@ -164,7 +173,10 @@ export async function find_path(map: WalkMap, from: Stand, to: Stand, wanted = (
     // Around a corner only where both cells beside it are clear.
     for (let side = 0; side < 4; ++side) {
       if (beside[side]! < 0 || beside[(side + 1) & 3]! < 0) continue;
-      const [x, y] = [sides[side]![0] + sides[(side + 1) & 3]![0], sides[side]![1] + sides[(side + 1) & 3]![1]];
+      const [x, y] = [
+        sides[side]![0] + sides[(side + 1) & 3]![0],
+        sides[side]![1] + sides[(side + 1) & 3]![1],
+      ];
       const next = search.node_at(column + x, row + y, height);
       if (next >= 0) reach(next, column + x, row + y, cost[node]! + diagonal, node);
     }
@@ -173,19 +185,31 @@ export async function find_path(map: WalkMap, from: Stand, to: Stand, wanted = (
   const path = [to];
   for (let node = end; node !== begin; ) {
     node = before[node]!;
-    path.push({ east: search.column_of(node) + 0.5, north: search.row_of(node) + 0.5, height: search.height_of(node) });
+    path.push({
+      east: search.column_of(node) + 0.5,
+      north: search.row_of(node) + 0.5,
+      height: search.height_of(node),
+    });
   }
   path[path.length - 1] = from;
   return with_straight_pieces(map, path.reverse(), breaths);
 }
 
 /** Leaves out what a straight line passes. */
-async function with_straight_pieces(map: WalkMap, path: readonly Stand[], breaths: Breaths): Promise<Stand[]> {
+async function with_straight_pieces(
+  map: WalkMap,
+  path: readonly Stand[],
+  breaths: Breaths,
+): Promise<Stand[]> {
   const turns = [path[0]!];
   for (let at = 0; at + 1 < path.length; ) {
     await breaths.take();
     let next = at + 1;
-    for (let far = Math.min(path.length - 1, at + most_skipped); far > next; far = Math.floor((far + at) / 2))
+    for (
+      let far = Math.min(path.length - 1, at + most_skipped);
+      far > next;
+      far = Math.floor((far + at) / 2)
+    )
       if (straight(map, path[at]!, path[far]!)) next = far;
     turns.push(path[next]!);
     at = next;

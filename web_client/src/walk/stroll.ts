@@ -3,7 +3,7 @@ import { add, length, look_at, scale, slerp, sub, type Vec3 } from '../base/vect
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { cells_per_eye_height, eyes_of, type Stand, type WalkMap } from './walk_map';
-import { ground_at } from './walker';
+import { floor_height } from './walker';
 
 const usual_cells_per_s = 1.25 * cells_per_eye_height;
 const longest_s = 10; // longer ways are gone faster
@@ -23,7 +23,7 @@ function dense(map: WalkMap, path: readonly Stand[]): Stand[] {
     for (let k = 1; k <= pieces; ++k) {
       const [east, north] = [from.east + (x * k) / pieces, from.north + (y * k) / pieces];
       const { height } = places[places.length - 1]!;
-      places.push({ east, north, height: ground_at(map, east, north, height) ?? height });
+      places.push({ east, north, height: floor_height(map, east, north, height) ?? height });
     }
   }
   return places;
@@ -47,7 +47,7 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
   const speed = Math.max(usual_cells_per_s * map.cell, way / longest_s);
   const ramp_s = Math.min(speeds_up_s, way / speed);
   const duration_s = way / speed + ramp_s;
-  const place_at = (gone: number): Vec3 => {
+  const point_at = (gone: number): Vec3 => {
     let [low, high] = [0, along.length - 1];
     while (high - low > 1) {
       const middle = (low + high) >> 1;
@@ -71,14 +71,15 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
     duration_s,
     at: (time_s) => {
       const gone = duration_s > 0 ? gone_at(Math.min(Math.max(time_s, 0), duration_s)) : way;
-      const here = place_at(gone);
+      const here = point_at(gone);
       // Towards the end, the direction stays that of the last stretch.
       const back = Math.max(0, Math.min(gone, way - ahead));
-      const line = sub(place_at(Math.min(way, gone + ahead)), place_at(back));
+      const line = sub(point_at(Math.min(way, gone + ahead)), point_at(back));
       const flat = sub(line, scale(up, line[0] * up[0] + line[1] * up[1] + line[2] * up[2]));
       const turned = duration_s > 0 ? Math.min(1, time_s / Math.min(turns_in_s, duration_s)) : 1;
       const share = turned * turned * (3 - 2 * turned);
-      const level = length(flat) > 1e-6 * ahead ? look_at(here, add(here, flat), up) : from.orientation;
+      const level =
+        length(flat) > 1e-6 * ahead ? look_at(here, add(here, flat), up) : from.orientation;
       return {
         position: add(here, scale(away, 1 - share)),
         orientation: slerp(from.orientation, level, share),

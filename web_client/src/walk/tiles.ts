@@ -41,7 +41,8 @@ export function column_in_tile({ width }: Tiles, column: number, row: number): n
   return y * Math.min(tile_side, width - (column - x)) + x;
 }
 
-export const tiles_in = (width: number, depth: number): number => Math.ceil(width / tile_side) * Math.ceil(depth / tile_side);
+export const tiles_in = (width: number, depth: number): number =>
+  Math.ceil(width / tile_side) * Math.ceil(depth / tile_side);
 
 export function require(right: boolean, field: string): void {
   if (!right) throw new Error(`walk file: ${field} is out of range`);
@@ -151,7 +152,13 @@ export class PackedTiles implements Tiles {
     const across = Math.ceil(this.width / tile_side);
     const wide = Math.min(tile_side, this.width - tile_side * (index % across));
     const deep = Math.min(tile_side, this.depth - tile_side * Math.floor(index / across));
-    return read_tile(inflated(this.bytes_.subarray(this.begin_[index], this.begin_[index + 1]), this.unpacked_[index]!), wide * deep);
+    return read_tile(
+      inflated(
+        this.bytes_.subarray(this.begin_[index], this.begin_[index + 1]),
+        this.unpacked_[index]!,
+      ),
+      wide * deep,
+    );
   }
 }
 

@@ -1,7 +1,18 @@
-// The ground of a scene on which a visitor can walk: a `.walk` file (render_core/walk/walk_file.h).
+// The walkable area of a scene: a `.walk` file (render_core/walk/walk_file.h).
 import { Breaths } from '../base/breaths';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
-import { column_in_tile, height_of, Kind, kind_of, most_levels, PackedTiles, require, tile_at, tile_side, type Tiles } from './tiles';
+import {
+  column_in_tile,
+  height_of,
+  Kind,
+  kind_of,
+  most_levels,
+  PackedTiles,
+  require,
+  tile_at,
+  tile_side,
+  type Tiles,
+} from './tiles';
 
 const header_bytes = 320;
 const most_side = 2048;
@@ -26,7 +37,7 @@ export interface Storey {
 }
 
 export interface WalkMap {
-  readonly origin: Vec3; // the world place of (0, 0, 0)
+  readonly origin: Vec3; // the world position of (0, 0, 0)
   readonly axes: readonly [east: Vec3, north: Vec3, up: Vec3]; // unit vectors of the world
   readonly cell: number; // world units
   readonly step: number; // cells; the highest step up or down
@@ -37,11 +48,15 @@ export interface WalkMap {
   readonly tiles: Tiles; // its columns, to the east, and its rows, to the north
 }
 
-export const to_grid = (map: WalkMap, place: Vec3): Vec3 => {
-  const from_origin = sub(place, map.origin);
+export const to_grid = (map: WalkMap, point: Vec3): Vec3 => {
+  const from_origin = sub(point, map.origin);
   const [east, north, up] = map.axes;
   const inverse = 1 / map.cell;
-  return [dot(from_origin, east) * inverse, dot(from_origin, north) * inverse, dot(from_origin, up) * inverse];
+  return [
+    dot(from_origin, east) * inverse,
+    dot(from_origin, north) * inverse,
+    dot(from_origin, up) * inverse,
+  ];
 };
 
 /** Grid coordinates in the world; `height` counts up from the lowest cell. */
@@ -75,7 +90,12 @@ export function places_at({ tiles }: WalkMap, column: number, row: number): Uint
 const no_places = new Uint16Array(0);
 
 /** The clear ground of a column within a step of `height`; -1 where there is none. */
-export function clear_at({ tiles, step }: WalkMap, column: number, row: number, height: number): number {
+export function clear_at(
+  { tiles, step }: WalkMap,
+  column: number,
+  row: number,
+  height: number,
+): number {
   if (!holds(tiles, column, row)) return -1;
   const { first, places } = tiles.at(tile_at(tiles, column, row));
   const c = column_in_tile(tiles, column, row);
@@ -84,9 +104,16 @@ export function clear_at({ tiles, step }: WalkMap, column: number, row: number, 
 }
 
 /** The index of the clear ground within a step of `height` among the places of a column; -1 where there is none. */
-export function clear_in(places: Uint16Array, begin: number, end: number, height: number, step: number): number {
+export function clear_in(
+  places: Uint16Array,
+  begin: number,
+  end: number,
+  height: number,
+  step: number,
+): number {
   for (let i = begin; i < end; ++i)
-    if (kind_of(places[i]!) === Kind.clear && Math.abs(height_of(places[i]!) - height) <= step) return i;
+    if (kind_of(places[i]!) === Kind.clear && Math.abs(height_of(places[i]!) - height) <= step)
+      return i;
   return -1;
 }
 
@@ -104,16 +131,25 @@ export function* blocks({ tiles }: WalkMap): Generator<Block> {
   for (let south = 0; south < depth; south += tile_side)
     for (let west = 0; west < width; west += tile_side)
       if (tiles.has(tile_at(tiles, west, south)))
-        yield { west, south, east: Math.min(west + tile_side, width), north: Math.min(south + tile_side, depth) };
+        yield {
+          west,
+          south,
+          east: Math.min(west + tile_side, width),
+          north: Math.min(south + tile_side, depth),
+        };
 }
 
 /** The smallest block around the columns with such places; undefined: there are none. */
-export async function block_around(map: WalkMap, such: (place: number) => boolean): Promise<Block | undefined> {
+export async function block_around(
+  map: WalkMap,
+  such: (place: number) => boolean,
+): Promise<Block | undefined> {
   let [west, south, east, north] = [Infinity, Infinity, 0, 0];
   const breaths = new Breaths();
   for (const block of blocks(map)) {
     await breaths.take();
-    if (block.west >= west && block.south >= south && block.east <= east && block.north <= north) continue;
+    if (block.west >= west && block.south >= south && block.east <= east && block.north <= north)
+      continue;
     for (let row = block.south; row < block.north; ++row)
       for (let column = block.west; column < block.east; ++column) {
         if (!places_at(map, column, row).some(such)) continue;
@@ -192,10 +228,13 @@ function require_sound(map: WalkMap): void {
   );
   require(right_angles && dot(cross(axes[0], axes[1]), axes[2]) > 0, 'axes');
   require(cell > 0 && cell < Infinity, 'cell');
-  require([step, radius, chest].every((cells) => cells > 0 && cells <= most_person_cells), 'person');
-  require(
-    storeys.every(({ low, level }, k) => low >= (storeys[k - 1]?.low ?? 0) && low <= most_levels && level >= 0 && level <= most_levels),
-    'storeys',
-  );
-  require(clear_at(map, Math.floor(start.east), Math.floor(start.north), start.height) >= 0, 'start');
+  require([step, radius, chest].every(
+    (cells) => cells > 0 && cells <= most_person_cells,
+  ), 'person');
+  require(storeys.every(
+    ({ low, level }, k) =>
+      low >= (storeys[k - 1]?.low ?? 0) && low <= most_levels && level >= 0 && level <= most_levels,
+  ), 'storeys');
+  require(clear_at(map, Math.floor(start.east), Math.floor(start.north), start.height) >=
+    0, 'start');
 }

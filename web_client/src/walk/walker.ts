@@ -7,8 +7,13 @@ const piece = 0.4; // cells; a body moves by at most this much at a time
 const most_pieces = 25_000;
 const aside = [0, 1, -1, 2, -2, 3, -3].map((k) => (k * Math.PI) / 8);
 
-/** Height of the ground at a place, bilinear between the middles of cells; undefined off clear ground. */
-export function ground_at(map: WalkMap, east: number, north: number, height: number): number | undefined {
+/** Height of the floor at a point, bilinear between the middles of cells; undefined off clear ground. */
+export function floor_height(
+  map: WalkMap,
+  east: number,
+  north: number,
+  height: number,
+): number | undefined {
   const here = clear_at(map, Math.floor(east), Math.floor(north), height);
   if (here < 0) return undefined;
   const own = height_of(here);
@@ -37,13 +42,13 @@ function try_piece(map: WalkMap, from: Stand, x: number, y: number): Stand | und
     if (ground < 0) ground = clear_at(map, here[0], there[1], height);
     if (ground < 0) return undefined;
   }
-  const height = ground_at(map, east, north, height_of(ground));
+  const height = floor_height(map, east, north, height_of(ground));
   return height === undefined ? undefined : { east, north, height };
 }
 
-/** The clear ground below a place of the world, where a visitor would come to stand. */
-export function stand_below(map: WalkMap, place: Vec3): Stand | undefined {
-  const [east, north, height] = to_grid(map, place);
+/** The clear ground below a point of the world, where a visitor would come to stand. */
+export function stand_below(map: WalkMap, point: Vec3): Stand | undefined {
+  const [east, north, height] = to_grid(map, point);
   const below = places_at(map, Math.floor(east), Math.floor(north)).findLast(
     (at) => kind_of(at) === Kind.clear && height_of(at) <= height + map.step,
   );

@@ -60,9 +60,9 @@ export type ToWorker =
   | { kind: 'watch'; watch: string }
   /** Of a visit of one's own: wants the camera of that session; '': no more. */
   | { kind: 'follow'; watch: string }
-  /** `pings`: followers may point at places. `tells_places`: the company hears where all in it are. */
-  | { kind: 'present'; on: boolean; name: string; pings: boolean; tells_places: boolean }
-  | { kind: 'ping'; place: Vec3 }
+  /** `pings`: participants may point. `tells_positions`: all hear where everybody is. */
+  | { kind: 'present'; on: boolean; name: string; pings: boolean; tells_positions: boolean }
+  | { kind: 'ping'; point: Vec3 }
   | { kind: 'stop' }
   | { kind: 'get_stats'; request: number }
   | { kind: 'get_snapshot'; request: number };
@@ -71,17 +71,23 @@ export type FromWorker =
   | { kind: 'state'; state: SessionState }
   | { kind: 'welcome'; welcome: Welcome }
   | { kind: 'config'; config: StreamConfig }
-  | { kind: 'presenter'; presenter: PresenterKind; warp: WarpState; warps: boolean; overscan: Sides }
+  | {
+      kind: 'presenter';
+      presenter: PresenterKind;
+      warp: WarpState;
+      warps: boolean;
+      overscan: Sides;
+    }
   /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `hit`: undefined where nothing is there. */
   | { kind: 'picked'; id: number; hit: Hit | undefined }
-  /** `eye`: where the leader's camera is, for those who follow. */
+  /** `eye`: where the host's camera is, for those who follow. */
   | { kind: 'lead'; lead: Lead; eye: Eye | undefined }
-  /** Somebody in the company points at a place. `name`: of who leads. */
-  | { kind: 'pinged'; place: Vec3; by_leader: boolean; name: string }
-  /** Where all in the company are, the leader first; empty: that is not told any more. */
-  | { kind: 'company_moved'; places: readonly Vec3[] }
+  /** Somebody in the shared tour points there. `name`: of the host. */
+  | { kind: 'pinged'; point: Vec3; by_host: boolean; name: string }
+  /** Where all in the shared tour are, the host first; empty: the server tells it no more. */
+  | { kind: 'participants_moved'; positions: readonly Vec3[] }
   | { kind: 'notice'; message: string }
   /** The server did not let the visitor into the scene that was selected. */
   | { kind: 'stayed'; message: string }

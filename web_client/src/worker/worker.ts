@@ -26,7 +26,8 @@ const scope = self as unknown as {
   onunhandledrejection: ((event: PromiseRejectionEvent) => void) | null;
 };
 
-const say = (message: FromWorker, transfer: Transferable[] = []): void => scope.postMessage(message, transfer);
+const say = (message: FromWorker, transfer: Transferable[] = []): void =>
+  scope.postMessage(message, transfer);
 
 let client: Client | undefined;
 
@@ -58,7 +59,7 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
-  private leader_ = ''; // the name of who leads
+  private host_ = ''; // the name of who presents
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
 
@@ -87,10 +88,7 @@ class Client {
         this.take_camera(message.sample);
         break;
       case 'view':
-        this.view_ = message.view;
-        this.display_.aspect = aspect_of(message.view);
-        this.quality_ = message.quality;
-        this.send_sizes();
+        this.resize(message);
         break;
       case 'warp':
         this.display_.mode = message.mode;
@@ -136,13 +134,13 @@ class Client {
         this.present(message);
         break;
       case 'ping':
-        this.session_.send({ case: 'ping', value: { place: wire_vector(message.place) } });
+        this.session_.send({ case: 'ping', value: { place: wire_vector(message.point) } });
         break;
       case 'stop':
         this.session_.stop();
         break;
       case 'get_stats':
-        say({ kind: 'stats', request: message.request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
+        this.post_stats(message.request);
         break;
       case 'get_snapshot':
         this.post_snapshot(message.request);
@@ -150,10 +148,29 @@ class Client {
     }
   }
 
-  private present({ on, name, pings, tells_places }: Extract<ToWorker, { kind: 'present' }>): void {
-    // The leader's pictures and field of view are also those of others, who see no warped view.
+  private resize({ view, quality }: Extract<ToWorker, { kind: 'view' }>): void {
+    this.view_ = view;
+    this.display_.aspect = aspect_of(view);
+    this.quality_ = quality;
+    this.send_sizes();
+  }
+
+  private post_stats(request: number): void {
+    say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
+  }
+
+  private present({
+    on,
+    name,
+    pings,
+    tells_positions,
+  }: Extract<ToWorker, { kind: 'present' }>): void {
+    // The host's pictures and field of view are also those of participants, who see no warped view.
     this.display_.may_overscan = !on;
-    this.session_.keep({ case: 'present', value: { on, name, pings, tellsPlaces: tells_places } });
+    this.session_.keep({
+      case: 'present',
+      value: { on, name, pings, tellsPlaces: tells_positions },
+    });
   }
 
   private pick(id: number, { origin, direction }: Ray): void {
@@ -215,14 +232,25 @@ class Client {
         picked: ({ id, hit, distance, spread }) =>
           say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
         lead: (lead) => {
-          this.leader_ = lead.name;
+          this.host_ = lead.name;
           const { camera } = lead;
-          say({ kind: 'lead', lead, eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad) });
+          say({
+            kind: 'lead',
+            lead,
+            eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad),
+          });
         },
         pinged: ({ place, byLeader }) => {
-          if (place) say({ kind: 'pinged', place: vector_of(place), by_leader: byLeader, name: this.leader_ });
+          if (place)
+            say({
+              kind: 'pinged',
+              point: vector_of(place),
+              by_host: byLeader,
+              name: this.host_,
+            });
         },
-        company: ({ places }) => say({ kind: 'company_moved', places: places.map(vector_of) }),
+        participants: ({ places }) =>
+          say({ kind: 'participants_moved', positions: places.map(vector_of) }),
         notice: (message) => say({ kind: 'notice', message }),
         stayed: (message) => say({ kind: 'stayed', message }),
       },
@@ -281,7 +309,8 @@ class Client {
     if (failures === 0) this.first_rung_ = this.rung_;
     const now_us = (): number => this.clock_.now_us();
     const made = await make_decoder(config, this.first_rung_, failures, now_us, events);
-    if (made && failures >= failures_per_rung && made.rung !== this.rung_) this.settle_on(made.rung);
+    if (made && failures >= failures_per_rung && made.rung !== this.rung_)
+      this.settle_on(made.rung);
     return made?.decoder;
   }
 
@@ -303,7 +332,9 @@ class Client {
   }
 }
 
-const clip_message = (plane: ClipPlane | undefined): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
+const clip_message = (
+  plane: ClipPlane | undefined,
+): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
   plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
 
 const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;

@@ -1,0 +1,45 @@
+import type { Eye } from '../camera/eye';
+import type { Navigation } from '../page/navigation';
+import type { Toolbar } from '../page/toolbar';
+import type { TourPlayer } from '../tour/player';
+
+/** Plays an author's tour once. At its end, or by Escape, the author is back where the preview began. */
+export class Preview {
+  private from_: Eye | undefined;
+
+  constructor(
+    private readonly player_: TourPlayer,
+    private readonly toolbar_: Toolbar,
+    private readonly navigation_: Navigation,
+  ) {
+    window.addEventListener(
+      'keydown',
+      (event) => {
+        if (event.key !== 'Escape' || !this.from_) return;
+        event.stopImmediatePropagation(); // it would close the panel
+        this.end();
+      },
+      { capture: true },
+    );
+  }
+
+  begin(): void {
+    this.from_ = this.navigation_.eye;
+    this.toolbar_.make_room();
+    this.player_.play_once(() => this.end());
+  }
+
+  /** The author continues from here, so that Escape leads nowhere. */
+  forget(): void {
+    this.from_ = undefined;
+  }
+
+  private end(): void {
+    const from = this.from_;
+    this.from_ = undefined;
+    this.player_.leave();
+    if (from) this.navigation_.put_back(from);
+    this.toolbar_.open('author');
+    document.getElementById('author-preview')?.focus();
+  }
+}

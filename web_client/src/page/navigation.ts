@@ -1,0 +1,297 @@
+// Moves the visitor through the scene: by pointers, keys, sticks, points to look at, and flights.
+import { browser_timers, type Clock } from '../base/clock';
+import { Signal } from '../base/signal';
+import { add, same, scale, type Vec3 } from '../base/vector';
+import { CameraController } from '../camera/camera_controller';
+import { CameraLoop } from '../camera/camera_loop';
+import type { CameraSample, Eye } from '../camera/eye';
+import type { Flight } from '../camera/flight';
+import { Inertia } from '../camera/inertia';
+import { camera_modes, type CameraMode } from '../camera/mode';
+import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
+import { ray_through, surface_of, type Ray } from '../camera/ray';
+import type { Walker } from '../camera/walker';
+import { Gamepads, type GamepadAction } from '../input/gamepad';
+import { bind_view_input } from '../input/view_input';
+import type { Mark } from '../measure/measurement';
+import { scene_setup, start_mode } from '../session/camera_messages';
+import { Picks } from '../session/picks';
+import type { SceneFacts, Welcome } from '../wire/wire';
+import type { WorkerClient } from '../worker/client';
+import { GestureRouter } from './gestures';
+
+const speed_per_step = 2 ** 0.25;
+const pointing_px = 1; // standard deviation of a click
+
+export class Navigation {
+  readonly camera = new CameraController();
+  readonly loop: CameraLoop;
+  /** The visitor has entered another scene. */
+  readonly entered = new Signal<{ scene: SceneFacts; scene_ids: readonly string[] }>();
+  /** The visitor has begun to move the camera by a gesture, a key or a stick, or leaves the scene. */
+  readonly taken_over = new Signal();
+  /** The mode or the field of view may have changed. */
+  readonly changed = new Signal();
+  /** The visitor has chosen another mode. */
+  readonly mode_chosen = new Signal();
+  /** The camera went back to where visits begin. */
+  readonly went_back = new Signal();
+  /** A flight or a jump begins that is no gesture: somebody or something else leads the camera from now on. */
+  readonly led_away = new Signal();
+  /** The visitor has said which way is up. */
+  readonly up_changed = new Signal();
+  /** The visitor has chosen another speed by wheel or key. */
+  readonly speed_chosen = new Signal<number>();
+  readonly sampled = new Signal<CameraSample>();
+  readonly pad_pressed = new Signal<GamepadAction>();
+  readonly gestures = new GestureRouter();
+  /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
+  led = false;
+  private readonly inertia_ = new Inertia();
+  private readonly picks_: Picks;
+  private scene_id_: string | undefined;
+  private overscan_ = { x: 1, y: 1 };
+  private pointed_ = 0;
+
+  constructor(
+    private readonly view_: HTMLElement,
+    worker: WorkerClient,
+    clock: Clock,
+    private readonly reduced_motion_: boolean,
+  ) {
+    this.picks_ = new Picks((id, ray) => worker.post({ kind: 'pick', id, ray }), browser_timers);
+    if (reduced_motion_) {
+      this.camera.smoothing_s = 0;
+      this.inertia_.enabled = false;
+    }
+    const { axes, is_touched } = this.bind_input();
+    this.loop = new CameraLoop(this.camera, axes, is_touched, this.inertia_, clock, (sample) => {
+      worker.post({ kind: 'camera', sample });
+      this.sampled.emit(sample);
+    });
+    worker.on('welcome', ({ welcome }) => this.welcomed(welcome));
+    worker.on('picked', ({ id, hit }) => this.picks_.answered(id, hit));
+    worker.on('presenter', ({ overscan }) => {
+      // Pictures need another field of view from now on. A new sample makes the server render one.
+      if (overscan.y !== this.overscan_.y || overscan.x !== this.overscan_.x) this.loop.changed();
+      this.overscan_ = overscan;
+    });
+  }
+
+  /** Id of the scene; '' before the first one. */
+  get scene_id(): string {
+    return this.scene_id_ ?? '';
+  }
+
+  get eye(): Eye {
+    return this.camera.eye;
+  }
+
+  /** The scene's scale to a visitor, world units. */
+  get reach(): number {
+    return this.camera.reach;
+  }
+
+  fly(way: Flight, ended: (arrived: boolean) => void): void {
+    this.led_away.emit();
+    this.camera.fly(way, ended);
+    this.loop.wake();
+  }
+
+  stop_flight(): void {
+    this.camera.stop_flight();
+  }
+
+  /** Puts the camera there, or as near as the scene's limits allow. Returns whether it is there. */
+  put(eye: Eye): boolean {
+    const position = this.camera.within(eye.position);
+    this.put_back({ ...eye, position });
+    return same(position, eye.position);
+  }
+
+  /** Puts the camera where it was before. The walkable area of a scene may lie outside its limits. */
+  put_back(eye: Eye): void {
+    this.led_away.emit();
+    this.camera.jump(eye);
+    this.camera.fov_y_rad = eye.fov_y_rad;
+    this.moved();
+  }
+
+  reset(): void {
+    this.taken_over.emit();
+    this.camera.reset();
+    this.went_back.emit();
+    this.moved();
+  }
+
+  /** Turns the scene about the view axis. Angles > 0 turn it to the left. */
+  turn_up(angle_rad: number): void {
+    this.camera.turn_up(angle_rad);
+    this.up_changed.emit();
+    this.moved();
+  }
+
+  /** Makes the surface in the middle of the view the floor. Returns whether there is one. */
+  async stand_here(): Promise<boolean> {
+    const d = 0.04; // shares of the view: far enough apart for a direction, near enough for one surface
+    const found = await Promise.all(
+      [
+        [-d, 0],
+        [d, 0],
+        [0, -d],
+        [0, d],
+      ].map(([x, y]) => this.point_at(0.5 + x!, 0.5 + y!)),
+    );
+    const floor = surface_of(found, this.eye.position);
+    if (!floor) return false;
+    this.led_away.emit();
+    this.camera.stand_on(floor.point, floor.normal, this.reduced_motion_);
+    this.up_changed.emit();
+    this.loop.wake();
+    return true;
+  }
+
+  /** The visitor's own factor on the speed of keys, sticks and flight. */
+  set_speed(factor: number): void {
+    this.camera.speed = factor;
+    this.changed.emit();
+  }
+
+  /** `steps`: notches of a wheel, > 0 for faster. */
+  faster(steps: number): void {
+    this.set_speed(this.camera.speed * speed_per_step ** steps);
+    this.speed_chosen.emit(this.camera.speed);
+  }
+
+  set_fov(fov_y_rad: number): void {
+    this.camera.fov_y_rad = fov_y_rad;
+    this.moved();
+  }
+
+  set_mode(mode: CameraMode): void {
+    this.camera.set_mode(mode, this.reduced_motion_);
+    this.loop.wake();
+    this.changed.emit();
+  }
+
+  /** Who walks from now on. `comes_down`: a camera that walks already comes down to the floor, if nothing leads it. */
+  set_walker(walker: Walker, comes_down: boolean): void {
+    this.camera.walker = walker;
+    if (!comes_down || this.camera.mode !== 'walk' || this.camera.is_flying) return;
+    this.camera.begin_mode(this.reduced_motion_);
+    this.loop.wake();
+  }
+
+  next_mode(): void {
+    const next = camera_modes.indexOf(this.camera.mode) + 1;
+    this.set_mode(camera_modes[next % camera_modes.length]!);
+    this.mode_chosen.emit();
+  }
+
+  /** The point in the middle of the view; undefined: nothing is there. */
+  point_ahead(): Promise<Vec3 | undefined> {
+    return this.point_at(0.5, 0.5);
+  }
+
+  /** The point of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in Pointed. */
+  async hit_at(x: number, y: number): Promise<Mark | undefined> {
+    const ray = this.ray_at(x, y);
+    const hit = await this.picks_.hit(ray);
+    if (!hit) return undefined;
+    const px_rad = this.eye.fov_y_rad / Math.max(1, this.view_.clientHeight);
+    return {
+      point: add(ray.origin, scale(ray.direction, hit.distance)),
+      direction: ray.direction,
+      along: hit.spread,
+      across: pointing_px * px_rad * hit.distance,
+    };
+  }
+
+  private bind_input(): { axes: () => Axes; is_touched: () => boolean } {
+    const { keys, pointers } = bind_view_input(this.view_, this.inertia_, {
+      gesture: (gesture) => this.gesture(gesture),
+      wheeled: (steps, is_pinch) => {
+        if (this.camera.mode === 'fly' && !is_pinch) this.faster(steps);
+        else this.gesture({ kind: 'dolly', steps });
+      },
+      keys_changed: () => this.take_over(),
+      let_go: () => this.loop.wake(),
+      wants_presses: () => this.gestures.has('point'),
+      pointed: (pointed) => this.gestures.route(pointed),
+    });
+    this.gestures.set('look', ({ x, y, how }) => {
+      const looks = how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk');
+      if (looks) void this.look_at(x, y);
+      return looks;
+    });
+    const pads = new Gamepads({
+      moved: () => {
+        if (is_held(pads.axes())) this.take_over();
+      },
+      action: (action) => {
+        if (action === 'mode') this.next_mode();
+        else if (action === 'reset') this.reset();
+        this.pad_pressed.emit(action);
+      },
+    });
+    return {
+      axes: () => sum_of(keys.axes(), pads.axes()),
+      is_touched: () => pointers.count > 0,
+    };
+  }
+
+  private gesture(gesture: Gesture): void {
+    this.taken_over.emit();
+    this.camera.gesture(gesture);
+    this.loop.wake();
+  }
+
+  private take_over(): void {
+    this.taken_over.emit();
+    this.loop.wake();
+  }
+
+  /** Something other than a gesture has moved the camera. */
+  private moved(): void {
+    this.changed.emit();
+    this.loop.changed();
+  }
+
+  private welcomed({ scene, sceneIds, watching }: Welcome): void {
+    if (watching) return; // another visitor moves the camera
+    // After a reconnect the visitor stays where they were.
+    if (!scene || scene.sceneId === this.scene_id_) return;
+    this.scene_id_ = scene.sceneId;
+    this.camera.walker = undefined;
+    this.camera.load(scene_setup(scene));
+    const mode = start_mode(scene);
+    if (mode) this.set_mode(mode);
+    this.loop.enable();
+    this.entered.emit({ scene, scene_ids: sceneIds });
+  }
+
+  /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */
+  private async look_at(x: number, y: number): Promise<void> {
+    const pointed = ++this.pointed_;
+    const point = await this.point_at(x, y);
+    if (!point || pointed !== this.pointed_) return;
+    this.taken_over.emit();
+    this.camera.focus_on(point, this.reduced_motion_);
+    this.loop.wake();
+  }
+
+  /** Point of the scene. `x`, `y`: shares of the view's width and height, y down. */
+  private point_at(x: number, y: number): Promise<Vec3 | undefined> {
+    return this.picks_.at(this.ray_at(x, y));
+  }
+
+  /** `x`, `y`: as in Pointed. */
+  ray_at(x: number, y: number): Ray {
+    return ray_through(
+      this.eye,
+      x,
+      y,
+      this.view_.clientWidth / Math.max(1, this.view_.clientHeight),
+    );
+  }
+}

@@ -1,0 +1,36 @@
+// The parts of the page that its larger features share.
+import { browser_storage } from '../base/browser_storage';
+import { clock_from, type Clock } from '../base/clock';
+import type { AccessToken } from '../session/token';
+import { WorkerClient } from '../worker/client';
+import { by_id } from './dom';
+import { Navigation } from './navigation';
+import { Notice } from './notice';
+import { SeenCamera } from './seen_camera';
+import { Toolbar } from './toolbar';
+
+export interface PageParts {
+  readonly view: HTMLElement;
+  readonly clock: Clock;
+  readonly worker: WorkerClient;
+  readonly navigation: Navigation;
+  readonly seen: SeenCamera;
+  readonly toolbar: Toolbar;
+  readonly notice: Notice;
+  readonly token: AccessToken;
+  readonly storage: Storage | undefined;
+  readonly reduced_motion: boolean;
+}
+
+export function make_page_parts(token: AccessToken): PageParts {
+  const view = by_id('view', HTMLElement);
+  const clock = clock_from(performance.timeOrigin);
+  const reduced_motion = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  const worker = new WorkerClient();
+  const notice = new Notice();
+  const navigation = new Navigation(view, worker, clock, reduced_motion);
+  const toolbar = new Toolbar(navigation);
+  const seen = new SeenCamera(worker, navigation);
+  const storage = browser_storage('localStorage');
+  return { view, clock, worker, navigation, seen, toolbar, notice, token, storage, reduced_motion };
+}

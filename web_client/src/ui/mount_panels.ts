@@ -1,0 +1,22 @@
+import type { PageParts } from '../page/parts';
+import { factor } from '../text/number';
+import { text } from '../text/text';
+import { MeasurePanel } from './measure_panel';
+import { QualityPanel } from './quality_panel';
+import { StatsPanel } from './stats_panel';
+import type { StreamSize } from './stream_size';
+
+/** The panels of the toolbar that have no feature of their own. `set_scale`: as in MeasurePanel. */
+export function mount_panels(
+  parts: PageParts,
+  stream_size: StreamSize,
+  set_scale: ((metres_per_unit: number) => void) | undefined,
+): void {
+  const { navigation, notice, worker, toolbar, storage } = parts;
+  new QualityPanel(navigation, stream_size, worker, storage);
+  new StatsPanel(worker, toolbar);
+  new MeasurePanel({ ...parts, set_scale });
+  navigation.speed_chosen.listen((speed) =>
+    notice.show(text.quality.speed_now({ factor: factor(speed) }), 2),
+  );
+}

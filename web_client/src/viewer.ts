@@ -1,0 +1,40 @@
+// Makes the parts of the page and starts the worker. Parts listen to each other without passing through here.
+import { TourMedia, TourMediaFields } from './media/tour_media';
+import { make_page_parts } from './page/parts';
+import type { AccessToken } from './session/token';
+import { make_automation } from './ui/automation';
+import type { CardView } from './ui/card';
+import { mount_panels } from './ui/mount_panels';
+import { mount_session } from './ui/mount_session';
+import { mount_tours } from './ui/mount_tours';
+import { Pointing } from './ui/pointing';
+import { SharedTour } from './ui/shared_tour';
+import { StreamSize } from './ui/stream_size';
+import { WalkableArea } from './walkable_area/mount';
+
+/** Returns what shows a fatal error of the page. `scene_id`: empty for the server's first scene. */
+export function mount_viewer(
+  card: CardView,
+  token: AccessToken,
+  scene_id: string,
+): (message: string) => void {
+  // `?ui=0`, for frames of other pages: nothing but the picture and the tour.
+  document.body.classList.toggle('bare', new URLSearchParams(location.search).get('ui') === '0');
+  const parts = make_page_parts(token);
+  const { view, worker, navigation, clock } = parts;
+  const stream_size = new StreamSize(view, worker);
+  const media = new TourMedia(() => token.value);
+  const { tours, set_scale } = mount_tours(parts, media, new TourMediaFields());
+  media.enlarged.listen(() => tours.player.pause());
+  mount_panels(parts, stream_size, set_scale);
+  const walkable_area = new WalkableArea({
+    ...parts,
+    tour_shown: tours.shown,
+    go_to_stop: (index) => tours.player.go_to(index),
+  });
+  worker.on('participants_moved', ({ positions }) => walkable_area.show_participants(positions));
+  const shared_tour = new SharedTour(parts, new Pointing(parts));
+  shared_tour.left.listen(() => walkable_area.show_participants([]));
+  window.catgs = make_automation(worker, navigation, clock);
+  return mount_session(parts, card, stream_size, scene_id);
+}
