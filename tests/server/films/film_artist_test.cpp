@@ -147,7 +147,7 @@ TEST_F(FilmArtist, AFullFolderForResultsIsNamed) {
     std::string text;
     try {
       const std::vector<FilmView> views(kind == FilmKind::film ? 30 : 1, view);
-      draw_film({kind, {256, 128}, views}, scene, file, [](double, Clock::duration) {});
+      draw_film({kind, {256, 128}, views}, take, file, [](double, Clock::duration) {});
     } catch (const InputError& error) {
       text = error.what();
     }
