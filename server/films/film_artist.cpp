@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/image/panorama.h"
 #include "render_core/image/png.h"

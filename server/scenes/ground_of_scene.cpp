@@ -123,7 +123,7 @@ std::string ground_name(const GroundSource& source) {
       "{}\n{} {} {}\n{} {} {}\n{} {}", scene, source.start.x, source.start.y, source.start.z,
       source.up.x, source.up.y, source.up.z, source.metres_per_unit, version));
   constexpr std::size_t digest_bytes = 16;
-  const TokenDigest of_scene = digest_of(source.spec);
+  const TokenDigest of_scene = digest_of(spec);
   return fmt::format("{:02x}-{:02x}.walk",
                      fmt::join(std::span(of_scene).first(ground_scene_digits / 2), ""),
                      fmt::join(std::span(digest).first(digest_bytes), ""));
