@@ -255,11 +255,11 @@ int LwsHttpExchange::answer(lws* wsi, HttpResponse response) {
 /// Two pieces of a body are in memory at most: this one, and the one that is being written.
 void LwsHttpExchange::read_ahead() {
   if (unwritten_ == 0) return;
-  if (response_.next_piece) next_piece_ = disk_.run(response_.next_piece, waiter_);
+  if (response_.next_piece) piece_ = disk_.run(response_.next_piece, waiter_);
   if (!response_.disk_body) return;
   const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
   const std::uint64_t offset = response_.disk_body->length - unwritten_;
-  piece_ = disk_.run<std::string>(
+  piece_ = disk_.run<std::optional<std::string>>(
       [body = response_.disk_body, offset, size] { return body->read(offset, size); }, waiter_);
 }
 
@@ -287,15 +287,14 @@ int LwsHttpExchange::on_writable(lws* wsi, std::vector<std::byte>& scratch) {
   if (!answering_) return answer_.valid() && is_ready(answer_) ? answer_now(wsi) : 0;
   if (unwritten_ == 0) return -1;
   if (piece_.valid() && !is_ready(piece_)) return 0;  // its thread wakes this one
-  if (next_piece_.valid() && !is_ready(next_piece_)) return 0;
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, piece_timeout_s);
   lws_callback_on_writable(wsi);
   return response_.next_piece ? write_next_piece(wsi, scratch) : write_piece(wsi, scratch);
 }
 
 int LwsHttpExchange::write_next_piece(lws* wsi, std::vector<std::byte>& scratch) {
-  if (!next_piece_.valid()) return -1;  // the disk's threads had too much to do
-  const std::optional<std::string> piece = next_piece_.get();
+  if (!piece_.valid()) return -1;  // the disk's threads had too much to do
+  const std::optional<std::string> piece = piece_.get();
   if (!piece) unwritten_ = 0;
   read_ahead();
   if (chunked_ && !piece) return write(wsi, "0\r\n\r\n", scratch);
@@ -306,17 +305,17 @@ int LwsHttpExchange::write_next_piece(lws* wsi, std::vector<std::byte>& scratch)
 
 int LwsHttpExchange::write_piece(lws* wsi, std::vector<std::byte>& scratch) {
   const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(chunk_bytes, unwritten_));
-  std::string piece;
+  std::string_view bytes;
+  std::optional<std::string> piece;
   if (piece_.valid()) {
     piece = piece_.get();
-    if (piece.size() != size) return -1;
+    if (!piece || piece->size() != size) return -1;
+    bytes = *piece;
   } else if (response_.disk_body) {
     return -1;  // the disk's threads had too much to do
+  } else {
+    bytes = std::string_view(*response_.body).substr(response_.body->size() - unwritten_, size);
   }
-  const std::string_view bytes =
-      response_.body
-          ? std::string_view(*response_.body).substr(response_.body->size() - unwritten_, size)
-          : std::string_view(piece);
   unwritten_ -= size;
   read_ahead();
   return write(wsi, bytes, scratch);

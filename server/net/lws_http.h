@@ -77,10 +77,9 @@ class LwsHttpExchange {
   HttpResponse response_;
   bool head_only_ = false;
   bool answering_ = false;
-  std::uint64_t unwritten_ = 0;     // bytes of the body; of unknown length: not 0 until it is whole
-  bool chunked_ = true;             // a body of unknown length is, but for clients of HTTP/1.0
-  std::future<std::string> piece_;  // of a body on the disk: the next one
-  std::future<std::optional<std::string>> next_piece_;  // of a body of unknown length
+  std::uint64_t unwritten_ = 0;  // bytes of the body; of unknown length: not 0 until it is whole
+  bool chunked_ = true;          // a body of unknown length is, but for clients of HTTP/1.0
+  std::future<std::optional<std::string>> piece_;  // of a body that others make: the next one
 
   // Uploads only. The request's head is gone by the time its body is complete.
   std::string path_;
