@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Churns the sessions of one server process for a long time, and says whether it stays as it was.
 
-  soak.py [--minutes 60] [--program build/release/bin/catgs-load] [--out build/soak]
+  soak.py [--minutes 60] [--warm-up 5] [--program build/release/bin/catgs-load] [--out build/soak]
   soak.py --minutes 9 --attach PID --url ws://127.0.0.1:8080 [--admin http://127.0.0.1:9090]
           [--server-log FILE] [--out build/soak] [-- further arguments of catgs-load]
 
@@ -346,7 +346,8 @@ def soak(arguments: argparse.Namespace) -> bool:
         text = log.read_bytes()[0 if server else first["log_bytes"]:].decode("utf-8", "replace")
         errors += [f"log: {line}" for line in bad_lines(text, strangers.lines())]
     samples = read_samples(samples_file)
-    report = soak_report.judge(samples) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
+    warm_up_s = None if arguments.warm_up is None else 60.0 * arguments.warm_up
+    report = soak_report.judge(samples, warm_up_s) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
     (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
     print(soak_report.to_text(report))
     return report["flat"] and not errors
@@ -355,6 +356,7 @@ def soak(arguments: argparse.Namespace) -> bool:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--warm-up", type=float, metavar="MINUTES", help="that are not judged (see soak_report.py)")
     parser.add_argument("--program", type=pathlib.Path, default=pathlib.Path("build/release/bin/catgs-load"))
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("build/soak"))
     parser.add_argument("--attach", type=int, metavar="PID")

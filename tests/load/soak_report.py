@@ -1,11 +1,12 @@
 """What the samples of a soak say: flat or not.
 
-A quantity is flat when its lower envelope does not rise. Warm-up, the first quarter of the time and
-a quarter of an hour at most (so long heaps may fill), and the silence after a run's last
-round are left out. What is left, in a short run with some of the warm-up in it, is cut into
+A quantity is flat when its lower envelope does not rise. Warm-up, when heaps fill, and the silence
+after a run's last round are left out. Unless told, warm-up is the first quarter of the time, and a
+quarter of an hour at most. What is left, in a short run with some of the warm-up in it, is cut into
 twelve windows of as many samples, of which each gives its least value: what is still there when
 most visitors have just gone. Theil and Sen's slope through those, the median of the slopes of all
-pairs, times the time from the first to the last is the growth. One window that stands out moves it little; a leak moves all of them.
+pairs, times the time from the first to the last is the growth. One window that stands out moves it
+little; a leak moves all of them.
 """
 
 import itertools
@@ -39,13 +40,14 @@ def points_of(samples: list[Sample], name: str) -> Points:
     return [(sample["at_s"], sample[name]) for sample in samples if name in sample]
 
 
-def lower_envelope(points: Points) -> Points:
+def lower_envelope(points: Points, warm_up_s: float | None = None) -> Points:
     """The least of each window after the warm-up, at the window's middle; empty with too few."""
     if not points:
         return []
     begin_s, end_s = points[0][0], points[-1][0]
-    warm_s = begin_s + min(WARM_UP_S, WARM_UP_SHARE * (end_s - begin_s))
-    points = [point for point in points if point[0] >= warm_s]
+    if warm_up_s is None:
+        warm_up_s = min(WARM_UP_S, WARM_UP_SHARE * (end_s - begin_s))
+    points = [point for point in points if point[0] >= begin_s + warm_up_s]
     if len(points) < 2 * WINDOWS:
         return []
     bounds = [round(i * len(points) / WINDOWS) for i in range(WINDOWS + 1)]
@@ -58,7 +60,7 @@ def growth(envelope: Points) -> float:
     return statistics.median(slopes) * (envelope[-1][0] - envelope[0][0])
 
 
-def judge(samples: list[Sample]) -> dict:
+def judge(samples: list[Sample], warm_up_s: float | None = None) -> dict:
     """The report, as JSON: "flat" is false also where there is too little to judge by."""
     report: dict = {"flat": bool(samples), "samples": len(samples), "quantities": {}}
     if samples:
@@ -67,7 +69,7 @@ def judge(samples: list[Sample]) -> dict:
         points = points_of(samples, quantity.name)
         if not points and quantity.name == "device_mb":
             continue  # no GPU
-        envelope = lower_envelope(points_of([s for s in samples if "settling" not in s], quantity.name))
+        envelope = lower_envelope(points_of([s for s in samples if "settling" not in s], quantity.name), warm_up_s)
         allowed = max(quantity.allowed,
                       quantity.allowed_share * (statistics.median(v for _, v in points) if points else 0.0))
         grown = growth(envelope) if envelope else float("nan")

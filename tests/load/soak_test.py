@@ -48,6 +48,13 @@ class Flatness(unittest.TestCase):
         self.assertIn("NOT FLAT", soak_report.to_text(long))
         self.assertNotIn("too short", soak_report.to_text(long))
 
+    def test_a_warm_up_that_is_told_is_left_out(self):
+        fills = samples(lambda s: 150.0 - 60.0 * max(0.0, 1.0 - s / 600.0), 15.0)
+        self.assertFalse(soak_report.judge(fills)["flat"])
+        self.assertTrue(soak_report.judge(fills, 600.0)["flat"])
+        leaks = samples(lambda s: 150.0 + 0.01 * s, 15.0)
+        self.assertFalse(soak_report.judge(leaks, 300.0)["flat"])
+
     def test_one_window_that_stands_out_is_flat(self):
         self.assertTrue(self.judge(lambda s: 150.0 + 80.0 * (2000 <= s < 2300))["flat"])
 

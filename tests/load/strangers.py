@@ -152,7 +152,9 @@ class Strangers:
     def _script(self) -> bytes:
         host, port = self.address
         with urllib.request.urlopen(f"http://{host}:{port}/", timeout=10.0) as page:
-            return re.search(rb'src="\.([^"]+\.js)"', page.read()).group(1)
+            if found := re.search(rb'src="\.([^"]+\.js)"', page.read()):
+                return found.group(1)
+        raise OSError("the server has no page: configure with -DCATGS_WEB=ON")
 
     def _look(self) -> None:
         for stranger in self.there[:]:

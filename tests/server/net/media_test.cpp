@@ -39,12 +39,13 @@ class Media : public testing::Test {
     folder.write("hall.media/film.mp4", film_ = film);
   }
   void start(bool with_tokens) {
-    server.emplace([&](ServerConfig& config) {
-      config.scenes = {(folder / "hall.ply").string(), "synth:garden:2000"};
-      if (with_tokens) config.token_key_file = key_file.string();
-      if (with_tokens) config.revoked_links = folder.write("revoked", "").string();
-      config.media_origins = {"https://media.example"};
-    });
+    server.emplace([&](ServerConfig& config) { configure(config, with_tokens); });
+  }
+  void configure(ServerConfig& config, bool with_tokens) const {
+    config.scenes = {(folder / "hall.ply").string(), "synth:garden:2000"};
+    if (with_tokens) config.token_key_file = key_file.string();
+    if (with_tokens) config.revoked_links = folder.write("revoked", "").string();
+    config.media_origins = {"https://media.example"};
   }
   [[nodiscard]] std::string token(const std::string& role, const std::string& of = "",
                                   const std::string& id = "") const {
@@ -216,6 +217,23 @@ TEST_F(Media, AreAddedByAuthors) {
   EXPECT_EQ(put("other.jpg", jpeg_file(), author, {{"origin", "https://evil.example"}}).status,
             403);
   EXPECT_FALSE(std::filesystem::exists(folder / "hall.media/other.jpg"));
+}
+
+TEST_F(Media, ServersOverOneFolderShareFilesAndPasses) {
+  start(true);
+  const RunningServer other([&](ServerConfig& config) { configure(config, true); });
+  const std::string author = token("author");
+  EXPECT_EQ(put("new.mp4", film_, author).status, 200);
+  const std::string path = "/api/scenes/hall/media/new.mp4";
+  const std::map<std::string, std::string> by_author{{"authorization", "Bearer " + author}};
+  const HttpReply there = http_get(other.port(), path, by_author);
+  EXPECT_EQ(there.body, film_);
+  EXPECT_EQ(there.headers.at("etag"), get("media/new.mp4", {}, author).headers.at("etag"));
+  const std::string pass = get("media-pass", {}, token("viewer")).body;
+  EXPECT_EQ(http_get(other.port(), path + "?pass=" + pass).status, 200);
+  auto only_a_new_one = by_author;
+  only_a_new_one["if-none-match"] = "*";
+  EXPECT_EQ(http_put(other.port(), path, film_, only_a_new_one).status, 412);
 }
 
 TEST_F(Media, AreCheckedBeforeTheyAreKept) {
