@@ -231,23 +231,27 @@ describe('a tour that waits at a stop with a long caption', () => {
     [640, 360],
     [480, 270],
     [360, 480],
-  ])('fits into a frame of %i x %i, and shows that its caption continues', async (width, height) => {
-    const { page } = await open(`${patient.url}?ui=0#stop=1`, { viewport: { width, height } });
-    const card = page.locator('#tour');
-    await card.getByText('A long story.').waitFor();
-    await keep_screenshot(page, `tour-frame-${width}x${height}`);
-    const box = (await card.boundingBox())!;
-    expect(box.height).toBeLessThan(0.7 * height);
-    expect(box.x).toBeGreaterThanOrEqual(0);
-    expect(box.x + box.width).toBeLessThanOrEqual(width);
-    expect(box.y).toBeGreaterThanOrEqual(0);
-    expect(box.y + box.height).toBeLessThanOrEqual(height);
-    const goes_on = (): Promise<string | null> => page.locator('#tour-text').getAttribute('class');
-    await expect.poll(goes_on).toContain('more-below');
-    await page.getByRole('button', { name: 'Next stop' }).click();
-    await page.getByText('2 of 2').waitFor();
-    await expect.poll(goes_on).not.toContain('more-below');
-  });
+  ])(
+    'fits into a frame of %i x %i, and shows that its caption continues',
+    async (width, height) => {
+      const { page } = await open(`${patient.url}?ui=0#stop=1`, { viewport: { width, height } });
+      const card = page.locator('#tour');
+      await card.getByText('A long story.').waitFor();
+      await keep_screenshot(page, `tour-frame-${width}x${height}`);
+      const box = (await card.boundingBox())!;
+      expect(box.height).toBeLessThan(0.7 * height);
+      expect(box.x).toBeGreaterThanOrEqual(0);
+      expect(box.x + box.width).toBeLessThanOrEqual(width);
+      expect(box.y).toBeGreaterThanOrEqual(0);
+      expect(box.y + box.height).toBeLessThanOrEqual(height);
+      const goes_on = (): Promise<string | null> =>
+        page.locator('#tour-text').getAttribute('class');
+      await expect.poll(goes_on).toContain('more-below');
+      await page.getByRole('button', { name: 'Next stop' }).click();
+      await page.getByText('2 of 2').waitFor();
+      await expect.poll(goes_on).not.toContain('more-below');
+    },
+  );
 });
 
 describe('sharing', () => {
