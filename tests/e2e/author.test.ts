@@ -68,7 +68,7 @@ describe('an author', () => {
     await page.getByLabel('Background').fill('#203040');
     await keep_screenshot(page, 'author-about');
     await page.getByRole('button', { name: 'Save to the server' }).click();
-    await page.getByText('Saved. Visitors get it').waitFor();
+    await page.getByText('Saved. Visitors see it').waitFor();
     expect(errors).toEqual([]);
 
     await visitor.page.reload();
@@ -95,7 +95,7 @@ describe('an author', () => {
     await page.getByText(/Not saved: mine.json: .*download the file/).waitFor();
     rmSync(in_the_way, { recursive: true });
     await page.getByRole('button', { name: 'Save to the server' }).click();
-    await page.getByText('Saved. Visitors get it').waitFor();
+    await page.getByText('Saved. Visitors see it').waitFor();
     expect(readFileSync(sidecar, 'utf8')).toContain('Changed.');
   });
 
@@ -166,7 +166,7 @@ describe('an author', () => {
     expect(await page.evaluate(() => document.activeElement?.id)).toBe('author-preview');
   });
 
-  it('is told when another one saved meanwhile, and replaces theirs on purpose only', async () => {
+  it('learns when another one saved meanwhile, and replaces that version on purpose only', async () => {
     const edit = async (page: Page, title: string): Promise<void> => {
       await page.getByRole('button', { name: 'Add a stop here' }).click();
       await page.getByLabel('Title of the tour', { exact: true }).fill(title);
@@ -177,7 +177,7 @@ describe('an author', () => {
       await open_as('author', '?author'),
     ];
     await edit(first, 'By the first');
-    await first.getByText('Saved. Visitors get it').waitFor();
+    await first.getByText('Saved. Visitors see it').waitFor();
     const replace = second.getByRole('button', { name: 'Replace the other version' });
     expect(await replace.isHidden()).toBe(true);
     await edit(second, 'By the second');
@@ -185,16 +185,16 @@ describe('an author', () => {
     await keep_screenshot(second, 'author-changed-meanwhile');
     expect(readFileSync(sidecar, 'utf8')).toContain('By the first');
     await replace.click();
-    await second.getByText('Saved. Visitors get it').waitFor();
+    await second.getByText('Saved. Visitors see it').waitFor();
     expect(await replace.isHidden()).toBe(true);
     expect(readFileSync(sidecar, 'utf8')).toContain('By the second');
     await edit(second, 'By the second again');
-    await second.getByText('Saved. Visitors get it').waitFor();
+    await second.getByText('Saved. Visitors see it').waitFor();
     await edit(first, 'By the first again');
     await first.getByText('Not saved: someone else has saved this scene').waitFor();
   });
 
-  it('whose link is a plain one saves a file, and is told how it gets to visitors', async () => {
+  it('whose link is a plain one saves a file, and learns how it gets to visitors', async () => {
     const { page } = await open_as('viewer', '?author');
     await page.getByRole('region', { name: 'Make a tour' }).waitFor();
     expect(await page.getByRole('button', { name: 'Save to the server' }).isHidden()).toBe(true);

@@ -197,7 +197,7 @@ describe('the mouse', () => {
 });
 
 describe('which way is up', () => {
-  it('is told by quarter turns, and by the surface in the middle of the view', async () => {
+  it('is set by quarter turns, and by the surface in the middle of the view', async () => {
     const page = await open();
     await page.getByRole('button', { name: 'Quality and view' }).click();
     const up_now = async (): Promise<Vec3> => rotate((await pose_of(page)).orientation, [0, -1, 0]);

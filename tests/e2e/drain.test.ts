@@ -1,4 +1,4 @@
-// One of two servers behind HAProxy is told to end. Its visitor moves to the other one over a second
+// One of two servers behind HAProxy ends. Its visitor moves to the other one over a second
 // connection and does not notice.
 import { writeFileSync } from 'node:fs';
 import path from 'node:path';
@@ -57,7 +57,7 @@ const watched = (page: Page): Promise<{ shown: number; longest_ms: number; cards
       (window as unknown as { seen: { shown: number; longest_ms: number; cards: number } }).seen,
   );
 
-it('a visitor of a server that drains goes on at the other one', async () => {
+it('a visitor of a server that drains continues at the other one', async () => {
   const { page, errors } = await open(proxy);
   const session = /session (\w+): \S+ looks at/;
   const from = servers.find((server) => session.test(server.log()))!;

@@ -126,7 +126,7 @@ it('a film is made for authors alone, within bounds', async () => {
   expect((await fetch(`${server.url}api/films/0123456789abcdef0123456789abcdef`)).status).toBe(404);
 });
 
-it('a visitor may save the camera path, and is told who may order', async () => {
+it('a visitor may save the camera path, and learns who may order', async () => {
   const { page } = await open(link('viewer'), windows.desktop);
   await open_panel(page);
   await page.getByText('To create one here, open an author link.').waitFor();

@@ -108,7 +108,7 @@ describe('an author', () => {
 
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await page.getByRole('button', { name: 'Save to the server' }).click();
-    await page.getByText('Saved. Visitors get it').waitFor();
+    await page.getByText('Saved. Visitors see it').waitFor();
     expect(errors.filter((error) => !error.includes('409'))).toEqual([]); // of the drawing
   });
 });

@@ -233,7 +233,7 @@ describe('a portal', () => {
     await keep_screenshot(page, 'portal-author');
     expect(await barriers(page)).toEqual([]);
     await page.getByRole('button', { name: 'Save to the server' }).click();
-    await page.getByText('Saved. Visitors get it').waitFor();
+    await page.getByText('Saved. Visitors see it').waitFor();
     await page.getByRole('button', { name: 'Show', exact: true }).click();
     await page
       .locator('#tour')

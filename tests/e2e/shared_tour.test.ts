@@ -129,7 +129,7 @@ describe('a presentation', () => {
     );
     await host.goto('about:blank'); // its slot is free
     await watcher.getByText('Nobody is presenting here now').waitFor();
-    await watcher.getByRole('button', { name: 'Look around myself' }).tap();
+    await watcher.getByRole('button', { name: 'Look around on my own' }).tap();
     await watcher.getByRole('button', { name: 'Share' }).waitFor();
     await settle(watcher);
     expect(distance(stood, await pose_of(watcher))).toBeLessThan(1e-3);

@@ -231,23 +231,27 @@ describe('a tour that waits at a stop with a long caption', () => {
     [640, 360],
     [480, 270],
     [360, 480],
-  ])('fits into a frame of %i x %i, and shows that its caption goes on', async (width, height) => {
-    const { page } = await open(`${patient.url}?ui=0#stop=1`, { viewport: { width, height } });
-    const card = page.locator('#tour');
-    await card.getByText('A long story.').waitFor();
-    await keep_screenshot(page, `tour-frame-${width}x${height}`);
-    const box = (await card.boundingBox())!;
-    expect(box.height).toBeLessThan(0.7 * height);
-    expect(box.x).toBeGreaterThanOrEqual(0);
-    expect(box.x + box.width).toBeLessThanOrEqual(width);
-    expect(box.y).toBeGreaterThanOrEqual(0);
-    expect(box.y + box.height).toBeLessThanOrEqual(height);
-    const goes_on = (): Promise<string | null> => page.locator('#tour-text').getAttribute('class');
-    await expect.poll(goes_on).toContain('more-below');
-    await page.getByRole('button', { name: 'Next stop' }).click();
-    await page.getByText('2 of 2').waitFor();
-    await expect.poll(goes_on).not.toContain('more-below');
-  });
+  ])(
+    'fits into a frame of %i x %i, and shows that its caption continues',
+    async (width, height) => {
+      const { page } = await open(`${patient.url}?ui=0#stop=1`, { viewport: { width, height } });
+      const card = page.locator('#tour');
+      await card.getByText('A long story.').waitFor();
+      await keep_screenshot(page, `tour-frame-${width}x${height}`);
+      const box = (await card.boundingBox())!;
+      expect(box.height).toBeLessThan(0.7 * height);
+      expect(box.x).toBeGreaterThanOrEqual(0);
+      expect(box.x + box.width).toBeLessThanOrEqual(width);
+      expect(box.y).toBeGreaterThanOrEqual(0);
+      expect(box.y + box.height).toBeLessThanOrEqual(height);
+      const goes_on = (): Promise<string | null> =>
+        page.locator('#tour-text').getAttribute('class');
+      await expect.poll(goes_on).toContain('more-below');
+      await page.getByRole('button', { name: 'Next stop' }).click();
+      await page.getByText('2 of 2').waitFor();
+      await expect.poll(goes_on).not.toContain('more-below');
+    },
+  );
 });
 
 describe('sharing', () => {
@@ -294,7 +298,7 @@ describe('sharing', () => {
     const { page, errors } = await open(server.url, windows.desktop);
     await page.getByRole('button', { name: 'Share' }).click();
     await page.getByRole('button', { name: 'Copy code for a web page' }).click();
-    await page.getByText('has to name that site with --embed-origin').waitFor();
+    await page.getByText('The operator allows a site with --embed-origin').waitFor();
     await keep_screenshot(page, 'share-code-nobody');
     expect(errors).toEqual([]);
   });
@@ -344,7 +348,7 @@ describe('sharing', () => {
     await sharing.getByRole('button', { name: 'Share' }).click();
     expect(await sharing.locator('#share-frames').isHidden()).toBe(true);
     await sharing.getByRole('button', { name: 'Copy code for a web page' }).click();
-    await sharing.getByText(`in pages of ${origin} only`).waitFor();
+    await sharing.getByText(`on pages of ${origin} only`).waitFor();
     await keep_screenshot(sharing, 'share-code');
     await say({ catgs: 'stop', stop: 1 });
     await frame.locator('#tour-text', { hasText: 'Markets are held' }).waitFor();
@@ -392,7 +396,7 @@ describe('ways to move', () => {
     expect(errors).toEqual([]);
   });
 
-  it('a flick of the pointer goes on for a moment, and not with reduced motion', async () => {
+  it('a flick of the pointer continues for a moment, and not with reduced motion', async () => {
     for (const reducedMotion of ['no-preference', 'reduce'] as const) {
       const { page } = await open(server.url, {
         viewport: { width: 640, height: 360 },

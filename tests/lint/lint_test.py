@@ -70,7 +70,7 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("is not in LAYERS", "web_client/src/new/a.ts", "import { b } from '../base/b';")
         self.expect_one("is not in LAYERS", "web_client/src/ui/a.ts", "import { b } from '../new/b';")
         self.expect_one("through worker/client", "web_client/src/ui/a.ts", "import '../worker/worker';")
-        self.expect_one("imports 21 modules", "web_client/src/ui/a.ts",
+        self.expect_one("includes 21 files of ours", "web_client/src/ui/a.ts",
                         *[f"import './{number}';" for number in range(lint.MAX_IMPORTS + 1)])
 
     def test_length_marker_words_and_guards(self):

@@ -107,10 +107,16 @@ describe('the tiles of a map', () => {
 
   it('are all checked before one is used', async () => {
     const tiles = [flat(64), flat(64), [...flat(64), 0]];
-    await expect(new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check()).rejects.toThrow('a tile');
+    await expect(new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check()).rejects.toThrow(
+      'a tile',
+    );
     tiles[2]!.pop();
-    await expect(new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check()).resolves.toBeUndefined();
-    await expect(new PackedTiles(64 * 3, 1, 64 * 3 - 1, packed(tiles)).check()).rejects.toThrow('places');
+    await expect(
+      new PackedTiles(64 * 3, 1, 64 * 3, packed(tiles)).check(),
+    ).resolves.toBeUndefined();
+    await expect(new PackedTiles(64 * 3, 1, 64 * 3 - 1, packed(tiles)).check()).rejects.toThrow(
+      'places',
+    );
   });
 
   it('are refused where the index is not theirs, without memory for what it names', () => {

@@ -66,7 +66,8 @@ describe('a walk file', () => {
         ++refused;
         return undefined;
       });
-      for (let t = 0; forged && t < tiles; ++t) expect(() => forged.tiles.at(t), String(k)).not.toThrow();
+      for (let t = 0; forged && t < tiles; ++t)
+        expect(() => forged.tiles.at(t), String(k)).not.toThrow();
     }
     expect(refused).toBeGreaterThan(0);
   }, 60_000);
@@ -86,7 +87,9 @@ describe('a walk file', () => {
     await forged('size', (view) => view.setUint32(104, 5000, true));
     await forged('places', (view) => view.setUint32(112, 0xffffffff, true));
     await forged('tile side', (view) => view.setUint32(116, 32, true));
-    await forged('packed bytes', (view) => view.setUint32(120, view.getUint32(120, true) - 1, true));
+    await forged('packed bytes', (view) =>
+      view.setUint32(120, view.getUint32(120, true) - 1, true),
+    );
     await forged('storeys', (view) => view.setUint32(124, 17, true));
     await forged('storeys', (view) => view.setFloat32(128, NaN, true));
     await forged('places', (view) => view.setUint32(112, view.getUint32(112, true) - 1, true));
