@@ -246,7 +246,7 @@ TEST_F(JsonFiles, FilesAboveTheirLimitAreRefused) {
     parse_sog_meta(FolderFiles(folder_.path()), "large.json");
   };
   const auto expect_limit = [&](std::uint64_t bytes, const auto& read) {
-    EXPECT_EQ(refusal(bytes, read), (Refusal{path.string(), "byte 0"})) << "it was read";
+    EXPECT_EQ(refusal(bytes, read), (Refusal{path.string(), "byte 1"})) << "it was read";
     EXPECT_EQ(refusal(bytes + 1, read), (Refusal{path.string(), ""}));
   };
   constexpr std::uint64_t mib = 1 << 20;

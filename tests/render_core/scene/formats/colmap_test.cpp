@@ -85,7 +85,7 @@ class Colmap : public FolderTest {
   }
   void expect_refused(const std::string& file, const std::string& where) const {
     EXPECT_EQ(refusal_of([this] { (void)read_colmap(folder_.path(), Distortion::refused); }),
-              (Refusal{(folder_ / file).string(), where}));
+              (Refusal{(file.empty() ? folder_.path() : folder_ / file).string(), where}));
   }
   /// The file with these lines must be refused.
   void expect_refused_with(const std::string& file, const std::string& lines,

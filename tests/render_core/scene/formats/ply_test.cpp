@@ -208,7 +208,7 @@ TEST(Ply, ErrorsNameTheHeaderLine) {
            {format + "element vertex -1\n", 3},
            {format + "property float x\n", 3},
            {format + "element vertex 1\nproperty quad x\nend_header\n", 4},
-           {format + "element vertex 1\n", 3},
+           {format + "element vertex 1\n", 4},
            {"ply\nend_header\n", 2},
            {format + "element a 1\nelement a 1\n", 4},
            {format + "element a 1\nproperty list uchar quad a\nend_header\n", 4},

@@ -257,7 +257,7 @@ TEST_F(TilesTest, NoNameLeadsOut) {
                   {uri, "a%00.glb", "file name 'a\\x00.glb'", folder},
                   {uri, "http://host/a.glb", "root.content.uri"},
                   {uri, "data:,x", "root.content.uri"},
-                  {uri, "", "", folder + "/"}});
+                  {uri, "", "file name ''", folder}});
 }
 
 TEST_F(TilesTest, NoFileIsUsedTwice) {
