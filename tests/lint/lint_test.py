@@ -193,5 +193,19 @@ class Declarations(unittest.TestCase):
                                  "server/b.h:1: no file includes it"])
 
 
+@unittest.skipUnless(shutil.which("cppcheck"), "cppcheck is not installed")
+class Cppcheck(unittest.TestCase):
+    def test_what_it_keeps_of_a_file_is_said_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            (root / "server").mkdir()
+            (root / "server/a.cpp").write_text("int f(int i) {\n  int a[3] = {0, 1, 2};\n  return a[i == 5 ? 7 : 0];\n}\n")
+            for _ in range(2):
+                result = subprocess.run([sys.executable, "-B", lint.__file__, "cppcheck", "--root", folder,
+                                         "--build", root / "build"], capture_output=True, text=True, check=False)
+                self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
+                self.assertIn("server/a.cpp:3: arrayIndexOutOfBounds", result.stderr)
+
+
 if __name__ == "__main__":
     unittest.main()
