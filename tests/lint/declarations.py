@@ -78,8 +78,8 @@ def class_sizes(tags: list[Tag]) -> tuple[dict[str, int], dict[str, int]]:
     for tag in tags:
         # Not a definition that stands outside its class.
         declared = tag.line in classes.get((tag.path, tag.scope), ())
-        constructor = tag.name == tag.scope.split("::")[-1]
-        if tag.kind in METHODS and declared and not constructor and not tag.name.startswith(("operator", "~", "__anon")):
+        special = tag.name == tag.scope.split("::")[-1] or tag.name.startswith(("operator", "~", "__anon"))
+        if tag.kind in METHODS and declared and not special:
             methods[tag.scope] += 1
         # What an anonymous struct holds counts, and not the name that holds it.
         if tag.kind == "member" and not re.search(r":__anon\w+$", tag.typeref):

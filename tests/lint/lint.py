@@ -308,7 +308,8 @@ def check_cppcheck(root: pathlib.Path, build: pathlib.Path) -> int:
     sources = [path for path in source_files(root)
                if re.match(r"(server|render_core)/.*\.cpp$", path) and not path.endswith("/kernels.cpp")]
     return subprocess.run(
-        [tool, f"-j{os.cpu_count()}", f"--cppcheck-build-dir={build}", "--std=c++20", "--language=c++", "--enable=warning,performance,portability", "--inline-suppr",
+        [tool, f"-j{os.cpu_count()}", f"--cppcheck-build-dir={build}", "--std=c++20", "--language=c++",
+         "--enable=warning,performance,portability", "--inline-suppr",
          "--quiet", "--error-exitcode=1", "-I.", "--template={file}:{line}: {id}: {message}",
          *(f"--suppress={name}" for name in CPPCHECK_SUPPRESSED), *sources],
         cwd=root, check=False).returncode
