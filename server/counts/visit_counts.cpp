@@ -118,7 +118,7 @@ DayCounts VisitCounts::take(const std::string& date) {
   auto day = days_.extract(date);
   if (!day) return {};
   entries_ -= entries_of(day.mapped());
-  return std::move(day.mapped());
+  return DayCounts(std::move(day.mapped()));
 }
 
 void VisitCounts::put_back(const std::string& date, const DayCounts& counts) {
