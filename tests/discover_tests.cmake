@@ -18,8 +18,12 @@ function(add name filter environment cost)
   if(RESULTS)
     set(output " \"--gtest_output=xml:${RESULTS}/${name}.xml\"")
   endif()
+  set(lock "")
+  if(LABELS STREQUAL gpu)
+    set(lock " RESOURCE_LOCK gpu")  # some tests fill its memory
+  endif()
   string(APPEND script "add_test(\"${name}\" \"${PROGRAM}\" \"--gtest_filter=${filter}\"${output})\n"
-    "set_tests_properties(\"${name}\" PROPERTIES LABELS \"${LABELS}\" TIMEOUT ${TIMEOUT} COST ${cost}\n"
+    "set_tests_properties(\"${name}\" PROPERTIES LABELS \"${LABELS}\" TIMEOUT ${TIMEOUT} COST ${cost}${lock}\n"
     "  WORKING_DIRECTORY \"${FOLDER}\" ENVIRONMENT \"${environment}\")\n")
   set(script "${script}" PARENT_SCOPE)
 endfunction()
