@@ -52,7 +52,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "render_core/metrics render_core/reference render_core/cpu render_core/cuda render_core/walk", "render_core",
     "render_core/first_sight", "render_core/scene/files", "render_core/synth", "render_core/tools",
     "render_core/tools/bench render_core/tools/render render_core/tools/trace",
-    "render_core/tools/paper render_core/tools/walk",
+    "render_core/tools/paper",
     "server/base", "server/encode", "server/pipeline", "server/net", "server/config server/access server/flow server/media",
     "server/scenes server/schedule server/counts", "server/visit server/films", "server",
     "web_client/src/base web_client/src/text web_client/src/wire",

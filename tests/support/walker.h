@@ -10,6 +10,9 @@
 
 namespace catgs::walk {
 
+// A second implementation of the page's walker (web_client/src/walk). Golden files compare the two,
+// and tests of maps walk with it.
+
 /// The clear ground below a place of the world, where a person would come to stand.
 std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& place);
 
