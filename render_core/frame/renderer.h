@@ -181,7 +181,7 @@ enum class RendererKind { automatic, cpu, cuda, reference };
 struct RendererOptions {
   RendererKind kind = RendererKind::automatic;
   std::shared_ptr<ThreadPool> pool;      // CPU core; null: the Renderer makes its own
-  std::string simd = "auto";             // CPU core: auto or a name of simd_targets()
+  std::string simd = "auto";             // CPU core: auto, SCALAR or an instruction set that this machine has
   std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
   // Pools that scenes in pages share; null: each scene has one of its own, of `scene_memory` bytes.
   std::shared_ptr<PagePools> pages{};
@@ -196,10 +196,6 @@ struct MadeRenderer {
   std::unique_ptr<Renderer> renderer;
   std::string reason;  // why this core was chosen, for people to read
 };
-
-/// Instruction sets that the CPU core can use on this machine, best first; the last one, "SCALAR",
-/// uses one lane.
-std::vector<std::string_view> simd_targets();
 
 /// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run or a
 /// wanted device does not exist.
