@@ -58,15 +58,10 @@ constexpr std::string_view no_client_page =
     "CaT-GS server: the browser client was not built with this server.\n"
     "Configure with -DCATGS_WEB=ON, or give --client-dir.\n";
 
-/// The built client of an installation (prefix/bin) or of a build tree (build/bin).
+/// The client of --client-dir, or the one that was built with this program.
 StaticFiles find_client(const std::string& client_dir) {
-  namespace fs = std::filesystem;
-  if (!client_dir.empty()) return StaticFiles(client_dir);
-  std::error_code error;
-  const fs::path bin = fs::read_symlink("/proc/self/exe", error).parent_path();
-  for (const char* folder : {"../share/catgs/web", "../web_client/dist"})
-    if (fs::exists(bin / folder / "index.html", error)) return StaticFiles(bin / folder);
-  return {};
+  const std::filesystem::path folder = client_dir.empty() ? built_client() : client_dir;
+  return folder.empty() ? StaticFiles() : StaticFiles(folder);
 }
 
 VisitOptions visit_options(const ServerConfig& config) {

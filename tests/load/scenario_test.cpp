@@ -5,9 +5,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
-#include "tests/load/html_report.h"
+#include "tests/load/chart_document.h"
 #include "tests/load/picture_check.h"
 #include "tests/load/prometheus_text.h"
 #include "tests/support/temporary_folder.h"
@@ -15,8 +16,8 @@
 namespace catgs::load {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using ::testing::ThrowsMessage;
 
 class ScenarioFile : public ::testing::Test {
@@ -137,9 +138,9 @@ TEST(PictureCheck, ColoursOfBothRanges) {
   expect_pixel(grey(76, 85, 255, true), 1, 0, 0);  // JFIF red
 }
 
-TEST(HtmlReport, IsAPageOfItsOwnThatEscapesWhatItQuotes) {
+TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {
   Scenario scenario;
-  scenario.title = "<b>&\"";
+  scenario.title = "</script>";
   Outcome outcome;
   GroupReport& group = outcome.report.groups.emplace_back();
   group.name = "<i>";
@@ -155,13 +156,25 @@ TEST(HtmlReport, IsAPageOfItsOwnThatEscapesWhatItQuotes) {
   }
   outcome.metrics = collect_metrics(outcome.report, {});
   outcome.requirements.emplace_back("errors<1");
-  const std::string html = to_html(scenario, outcome);
-  EXPECT_THAT(html, HasSubstr("<h1>&lt;b&gt;&amp;&quot;</h1>"));
-  EXPECT_THAT(html, HasSubstr("errors&lt;1"));
-  EXPECT_THAT(html, HasSubstr("<path class=\"curve c0\" d=\"M"));
-  EXPECT_THAT(html, Not(HasSubstr("<i>")));
-  EXPECT_THAT(html, Not(HasSubstr("nan")));
-  EXPECT_THAT(html, Not(HasSubstr("://"))) << "nothing comes from elsewhere";
+  const auto document = chart_document(scenario, outcome);
+  const auto& parts = document.at("parts");
+  EXPECT_EQ(parts.at(0).at("table").at("rows").at(0).at(2), "holds");
+  EXPECT_EQ(parts.at(1).at("table").at("rows").at(0).at(0), "<i>");
+  const auto& plots = parts.at(2).at("plots");
+  EXPECT_EQ(plots.size(), 6u);
+  const auto& curves = plots.at(0).at("curves");
+  ASSERT_EQ(curves.size(), 2u) << "the group's and the bound";
+  EXPECT_NEAR(curves.at(0).at("y").at(0).get<double>(), 9.0, 0.1);
+  EXPECT_EQ(curves.at(1).at("y").at(0), 33.0);
+  const auto& shares = parts.at(3).at("plots").at(1).at("curves").at(0);
+  ASSERT_EQ(shares.at("x").size(), 1u);
+  EXPECT_NEAR(shares.at("x").at(0).get<double>(), 16.0, 0.2);
+  EXPECT_NEAR(shares.at("y").at(0).get<double>(), 99.9, 1e-9);
+
+  const std::string page = with_document("<a id=\"document\"></a>", document);
+  EXPECT_THAT(page, HasSubstr(R"(id="document">{"title":"<\/script>",)"));
+  EXPECT_THAT(page, EndsWith("]}]}</a>"));
+  EXPECT_THROW(with_document("<html></html>", document), InputError);
 }
 
 TEST(TimeSeries, StaysBoundedAndKeepsItsSums) {
