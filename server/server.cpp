@@ -235,11 +235,12 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
     metrics.set_loop_stalled(std::string(loop.name), loop.stalled);
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
+  if (request.path == "/api/metrics") return text_response(200, metrics.json(), "application/json");
   if (request.path == "/api/sessions")
     return text_response(200, places->published_json(), "application/json");
   if (visits_page)
     if (auto answer = visits_page->respond(request)) return *std::move(answer);
-  return text_response(404, "404: /metrics, /visits and /api/sessions are here\n");
+  return text_response(404, "404: /metrics, /visits, /api/metrics and /api/sessions are here\n");
 }
 
 void Server::State::count_visits() {

@@ -10,7 +10,7 @@
 #include "render_core/base/error.h"
 #include "tests/load/chart_document.h"
 #include "tests/load/picture_check.h"
-#include "tests/load/prometheus_text.h"
+#include "tests/load/server_metrics.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::load {
@@ -91,21 +91,16 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
   expect_refused("[[clients]\n", "line 1");
 }
 
-TEST(PrometheusText, ChangesBetweenScrapesAreMeasured) {
-  const auto before = parse_prometheus(
-      "# HELP x y\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 100\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 100\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 100\n"
-      "catgs_stage_seconds_sum{stage=\"wait\"} 1\n"
-      "catgs_stage_seconds_count{stage=\"wait\"} 100\n"
-      "catgs_frames_total 7\ncatgs_sessions 3\n");
-  const auto after = parse_prometheus(
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 150\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 200\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 200\n"
-      "catgs_stage_seconds_sum{stage=\"wait\"} 1.5\n"
-      "catgs_frames_total 17\ncatgs_sessions 4\n");
+TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
+  const auto answer = [](int fast, int all, double sum_s, int frames, int sessions) {
+    return nlohmann::json{{"catgs_stage_seconds",
+                           {{{"labels", {{"stage", "wait"}}},
+                             {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
+                             {"sum", sum_s}}}},
+                          {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
+                          {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}}};
+  };
+  const auto before = answer(100, 100, 1.0, 7, 3), after = answer(150, 200, 1.5, 17, 4);
   const Metrics change = change_between(before, after, "server.");
   EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p50_ms"), 1.0);
   EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p95_ms"), 1.0 + 9.0 * 45.0 / 50.0);

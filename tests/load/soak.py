@@ -8,7 +8,7 @@
 Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose their sockets and
 resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
 misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
-descriptors and threads are read from /proc, every five seconds /metrics, and nvidia-smi where there
+descriptors and threads are read from /proc, every five seconds /api/metrics, and nvidia-smi where there
 is one. --out gets samples.jsonl, misdeeds.txt and soak.json.
 
 Without --attach it starts the catgs-server beside the program, and stops it at the end; strangers then
@@ -76,17 +76,14 @@ def get(url: str) -> str:
 
 def parse_metrics(text: str) -> dict[str, float]:
     """Name to value; the values of a name's labels are summed."""
-    values: dict[str, float] = {}
-    for name, value in re.findall(r"^(\w+)(?:\{[^}]*\})? (\S+)$", text, re.MULTILINE):
-        values[name] = values.get(name, 0.0) + float(value)
-    return values
+    return {name: sum(one.get("value", 0.0) for one in series) for name, series in json.loads(text).items()}
 
 
 def looked_at(metrics: dict[str, float]) -> dict[str, float]:
     """Those that are sampled. A name that the server no longer has would otherwise stand still for ever."""
     names = (*GAUGES, *COUNTERS, *NEVER)
     if missing := [name for name in names if name not in metrics]:
-        raise Cannot(f"the server's /metrics lack {', '.join(missing)}")
+        raise Cannot(f"the server's /api/metrics lack {', '.join(missing)}")
     return {name: metrics[name] for name in names}
 
 
@@ -107,7 +104,7 @@ def device_mb() -> float | None:
 
 
 class Process:
-    """A running server, as /proc and /metrics show it."""
+    """A running server, as /proc and /api/metrics show it."""
 
     def __init__(self, pid: int, admin: str):
         self.folder = pathlib.Path("/proc") / str(pid)
@@ -142,7 +139,7 @@ class Process:
                 "descriptors": len(list((self.folder / "fd").iterdir())), "threads": field("Threads")}
 
     def metrics(self) -> dict[str, float]:
-        return looked_at(parse_metrics(get(self.admin + "/metrics")))
+        return looked_at(parse_metrics(get(self.admin + "/api/metrics")))
 
 
 class Sampler(threading.Thread):

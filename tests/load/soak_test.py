@@ -113,7 +113,9 @@ class Findings(unittest.TestCase):
             self.assertEqual(of(1, [other]), [other, "1 lines too few: 127.0.0.1: refused"])
 
     def test_labels_of_a_metric_are_summed(self):
-        metrics = soak.parse_metrics('# HELP a b\na_total{by="x"} 1\na_total{by="y"} 2\nb 3.5e+01\n')
+        metrics = soak.parse_metrics(
+            '{"a_total": [{"labels": {"by": "x"}, "value": 1}, {"labels": {"by": "y"}, "value": 2}], '
+            '"b": [{"labels": {}, "value": 35}]}')
         self.assertEqual(metrics, {"a_total": 3.0, "b": 35.0})
 
     def test_a_metric_that_is_no_longer_there_does_not_stand_still(self):

@@ -1,0 +1,90 @@
+#include "tests/load/server_metrics.h"
+
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+namespace catgs::load {
+namespace {
+
+using Json = nlohmann::json;
+using Buckets = std::map<double, double>;  // upper bound in seconds, cumulative count
+
+/// JSON has null for what is no finite number.
+double number(const Json& json, double null_means) {
+  return json.is_null() ? null_means : json.get<double>();
+}
+
+std::string series_name(std::string family, const Json& series) {
+  if (family.starts_with("catgs_")) family.erase(0, 6);
+  if (series.contains("buckets") && family.ends_with("_seconds")) family.resize(family.size() - 8);
+  for (const Json& value : series.at("labels")) family += "_" + value.get<std::string>();
+  return family;
+}
+
+/// The series of the same labels; null if there is none.
+const Json* find_series(const Json& metrics, const std::string& family, const Json& labels) {
+  if (!metrics.contains(family)) return nullptr;
+  for (const Json& series : metrics.at(family))
+    if (series.at("labels") == labels) return &series;
+  return nullptr;
+}
+
+void add(const Json& series, double sign, Buckets& buckets) {
+  for (const Json& bucket : series.at("buckets")) {
+    buckets[number(bucket.at(0), std::numeric_limits<double>::infinity())] +=
+        sign * bucket.at(1).get<double>();
+  }
+}
+
+double percentile_ms(const Buckets& buckets, double share) {
+  const double rank = share * buckets.rbegin()->second;
+  double bound_below = 0.0, count_below = 0.0;
+  for (const auto& [bound, count] : buckets) {
+    if (count >= rank && count > count_below) {
+      if (std::isinf(bound)) return 1e3 * bound;
+      return 1e3 *
+             (bound_below + (bound - bound_below) * (rank - count_below) / (count - count_below));
+    }
+    bound_below = bound;
+    count_below = count;
+  }
+  return std::nan("");
+}
+
+void add_durations(const std::string& name, const Json& series, const Json* old, Metrics& metrics) {
+  Buckets buckets;
+  add(series, 1.0, buckets);
+  double sum_s = series.at("sum");
+  if (old) {
+    add(*old, -1.0, buckets);
+    sum_s -= old->at("sum").get<double>();
+  }
+  metrics.emplace_back(name + "_mean_ms", 1e3 * sum_s / buckets.rbegin()->second);
+  metrics.emplace_back(name + "_p50_ms", percentile_ms(buckets, 0.50));
+  metrics.emplace_back(name + "_p95_ms", percentile_ms(buckets, 0.95));
+  metrics.emplace_back(name + "_p99_ms", percentile_ms(buckets, 0.99));
+}
+
+}  // namespace
+
+Metrics change_between(const Json& before, const Json& after, const std::string& prefix) {
+  Metrics metrics;
+  for (const auto& [family, all] : after.items())
+    for (const Json& series : all) {
+      const Json* old = find_series(before, family, series.at("labels"));
+      const std::string name = prefix + series_name(family, series);
+      if (series.contains("buckets")) {
+        add_durations(name, series, old, metrics);
+      } else {
+        const double value = number(series.at("value"), std::nan(""));
+        const bool counts = family.ends_with("_total") && old != nullptr;
+        metrics.emplace_back(name, counts ? value - old->at("value").get<double>() : value);
+      }
+    }
+  return metrics;
+}
+
+}  // namespace catgs::load
