@@ -9,7 +9,7 @@ Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose t
 resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
 misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
 descriptors and threads are read from /proc, every five seconds /api/metrics, and nvidia-smi where there
-is one. --out gets samples.jsonl, misdeeds.txt and soak.json.
+is one. --out gets samples.jsonl, misdeeds.txt, soak.json, and soak.html with plots if the web client was built.
 
 Without --attach it starts the catgs-server beside the program, and stops it at the end; strangers then
 also save like an author who never ends. With it the server is one that runs already, on a loopback
@@ -310,6 +310,16 @@ def read_samples(path: pathlib.Path) -> list[dict[str, float]]:
     return [json.loads(line) for line in path.read_text("utf-8").splitlines()[1:]]
 
 
+def write_page(arguments: argparse.Namespace, document: dict) -> None:
+    """Plots of the samples, if the web client was built."""
+    for folder in ("share/catgs/web", "web_client/dist"):
+        page = arguments.program.parent.parent / folder / "charts.html"
+        if page.exists():
+            text = json.dumps(document).replace("</", "<\\/")
+            html = page.read_text("utf-8").replace('id="document">', f'id="document">{text}', 1)
+            (arguments.out / "soak.html").write_text(html, "utf-8")
+
+
 def soak(arguments: argparse.Namespace) -> bool:
     arguments.out.mkdir(parents=True, exist_ok=True)
     server, link = None, ""
@@ -346,6 +356,7 @@ def soak(arguments: argparse.Namespace) -> bool:
     warm_up_s = None if arguments.warm_up is None else 60.0 * arguments.warm_up
     report = soak_report.judge(samples, warm_up_s) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
     (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
+    write_page(arguments, soak_report.chart_document(report, samples))
     print(soak_report.to_text(report))
     return report["flat"] and not errors
 

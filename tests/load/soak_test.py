@@ -78,6 +78,13 @@ class Flatness(unittest.TestCase):
         self.assertTrue(soak_report.judge(first)["flat"], "too little to be seen in nine minutes")
         self.assertFalse(soak_report.judge(first + later)["flat"])
 
+    def test_the_page_has_each_quantity_and_its_envelope(self):
+        taken = samples(lambda s: 150.0)
+        report = soak_report.judge(taken) | {"rounds": 3, "errors": []}
+        plots = soak_report.chart_document(report, taken)["parts"][0]["plots"]
+        self.assertEqual([plot["title"] for plot in plots], ["rss_mb", "descriptors", "threads"])
+        self.assertEqual([len(curve["x"]) for curve in plots[0]["curves"]], [len(taken), soak_report.WINDOWS])
+
     def test_too_little_is_not_flat(self):
         self.assertFalse(soak_report.judge([])["flat"])
         self.assertFalse(self.judge(lambda s: 150.0, 0.3)["flat"])
