@@ -144,7 +144,7 @@ TEST(PaperView, KeyOrderIsWrongOnceTheViewTurned) {
   EXPECT_LT(psnr, 60.0);
 }
 
-TEST(PaperView, WithoutForecastIsTheExactPipeline) {
+TEST(PaperView, NoForecastGivesTheExactPipeline) {
   const TestScene scene = test::small_scenes().front();
   const auto renderer = cpu_renderer_of(scene);
   const auto view = renderer->make_view({.pipeline = Pipeline::paper});

@@ -277,7 +277,7 @@ TEST(Predictor, TremorIsNoMotion) {
   }
 }
 
-TEST(Predictor, WhatIsTremorDependsOnTheScene) {
+TEST(Predictor, TheTremorThresholdDependsOnTheScene) {
   EXPECT_DOUBLE_EQ(forecast_lever(0.2f), 15.0 * static_cast<double>(0.2f));
   EXPECT_EQ(forecast_lever(0.0f), PredictorSettings{}.lever);
   for (const float near_z : {0.2f, 0.002f}) {
