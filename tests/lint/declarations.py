@@ -31,7 +31,7 @@ TABLES = {
     "ViewMemory": "one field a buffer, by the table of a View's memory",
 }
 USED_ELSEWHERE = {
-    "access_unit_delimiter", "sei", "ref_idc",  # H.264's enumerations are whole
+    "access_unit_delimiter", "idr_slice", "sei", "ref_idc",  # H.264's enumerations are whole
     "main", "clone", "flush_", "set_formatter_", "sink_it_",  # the system and spdlog call these
     "boolean", "end_array", "end_object", "number_float", "number_integer", "number_unsigned",
     "start_array", "start_object",  # nlohmann/json calls these

@@ -72,7 +72,7 @@ class LinkShaper {
     std::int64_t time_us = 0;
     std::size_t bytes = 0;
   };
-  /// What the sender comes to know.
+  /// The sender's knowledge.
   struct Notice {
     enum class Kind { acked, lost, timed_out } kind = Kind::acked;
     std::int64_t sent_us = 0;

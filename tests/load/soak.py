@@ -7,14 +7,14 @@
 
 Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose their sockets and
 resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
-misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
+misdeeds.py and must be refused each time as stated there. Once a second the server's memory,
 descriptors and threads are read from /proc, every five seconds /api/metrics, and nvidia-smi where there
 is one. --out gets samples.jsonl, misdeeds.txt, soak.json, and soak.html with plots if the web client was built.
 
 Without --attach it starts the catgs-server beside the program, and stops it at the end; strangers then
 also save like an author who never ends. With it the server is one that runs already, on a loopback
-address and without tokens, and stays; a later run with the same --out and the same process goes on
-where the last one ended and judges both together.
+address and without tokens, and stays; a later run with the same --out and the same process continues
+the last one and judges both together.
 
 Flat: see soak_report.py. Errors: since the first of these runs the server's log must have no line of
 level warning or above but those that the strangers caused, and these as often as they did; the
@@ -143,7 +143,7 @@ class Process:
 
 
 class Sampler(threading.Thread):
-    """Writes samples of the process until it is told to stop or the process has ended."""
+    """Writes samples of the process until stop() or the end of the process."""
 
     def __init__(self, process: Process, path: pathlib.Path):
         super().__init__()
@@ -176,7 +176,7 @@ class Sampler(threading.Thread):
 
 def bad_lines(text: str, caused: collections.Counter[str]) -> list[str]:
     """Of a log in either format: level warning and above. `caused`: warnings that have to be there, and
-    how often; those that lack are told, too."""
+    how often; missing ones are reported, too."""
     bad = []
     left = caused.copy()
     for line in text.splitlines():

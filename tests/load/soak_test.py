@@ -152,7 +152,7 @@ class Findings(unittest.TestCase):
 
 
 class StandIn:
-    """A process whose metrics are told."""
+    """A process with given metrics."""
 
     def __init__(self, pid, value):
         self.folder, self.begin_s, self.value = pathlib.Path("/proc") / str(pid), 7.0, value

@@ -179,7 +179,7 @@ TEST(Predictor, PromisesNoFrameBehindTheHorizon) {
     const auto forecast = predictor.forecast(now_us, c.rate_hz, c.asked);
     ASSERT_TRUE(forecast.has_value());
     EXPECT_EQ(forecast->frames, c.held) << c.rate_hz << " Hz, " << c.age_us << " us";
-    // The motion goes on as fast as it is, to the last frame that is promised.
+    // The motion keeps its speed up to the last promised frame.
     if (c.held == 0) continue;
     const auto end_us = now_us + static_cast<std::int64_t>(c.held * 1e6 / c.rate_hz);
     expect_near(forecast->world_from_camera, on_path(end_us).world_from_camera);
