@@ -12,7 +12,7 @@
 
 namespace catgs::walk {
 
-/// What a column has at a height.
+/// The contents of a column at a height.
 enum class Kind : std::uint8_t {
   clear,    // ground for a person's axis: the whole body has room
   near,     // ground, but less than a body's radius from an edge or an obstacle

@@ -147,7 +147,7 @@ TEST(LinkShaper, DataBehindALossWaitsForIt) {
   EXPECT_EQ(longest, 10'000 + 20'000 + 200'000) << "delay, round trip, retransmission timeout";
 }
 
-/// What a sender that always has more gets through, and what becomes of its window.
+/// The throughput and window of a sender that always has more data.
 struct Transfer {
   explicit Transfer(std::string_view text) : settings(parse_link("", text)) {}
 

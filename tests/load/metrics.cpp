@@ -82,7 +82,7 @@ void add_pictures(const SessionReports& sessions, Metrics& metrics) {
   metrics.emplace_back("psnr_min_db", count > 0.0 ? min : none);
 }
 
-/// Of a rest, until a picture of the wanted size was there that shows what the scene does.
+/// Time from the start of a rest to a sharp picture of the wanted size.
 double sharp_after_ms(const SessionReport& session, int rest) {
   for (const PictureSample& sample : session.pictures)
     if (sample.rest == rest && sample.picture.size_px == session.still_size_px &&

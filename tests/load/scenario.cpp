@@ -20,7 +20,7 @@ InputError mistake(const std::string& path, const toml::node& node, std::string_
   return InputError(path, fmt::format("line {}", node.source().begin.line), what, remedy);
 }
 
-/// What stands in the file, as a command line has it.
+/// A value of the file, as on a command line.
 std::string text_of(const std::string& path, const toml::node& node) {
   if (const auto text = node.value_exact<std::string>()) return *text;
   if (const auto number = node.value_exact<std::int64_t>()) return std::to_string(*number);

@@ -13,7 +13,7 @@
 
 namespace catgs::load {
 
-/// What the machine did in a span, shares of all its cores.
+/// The load of the machine in a span, as shares of all its cores.
 struct UsageSample {
   double at_s = 0.0;  // since the first sample
   double server_cpu = 0.0, generator_cpu = 0.0, machine_cpu = 0.0;
