@@ -98,7 +98,7 @@ class Reader {
             "are not those behind the header");
     read_tiles(std::span(bytes).subspan(sizeof header_));
     const glm::ivec2 start(glm::floor(map_.start.place));
-    require(map_.clear_at(start, map_.start.height), "start", "is no clear ground");
+    require(map_.clear_at(start, map_.start.height), "start", "is not clear ground");
     return std::move(map_);
   }
 
@@ -119,7 +119,7 @@ class Reader {
     bool turned = in(h.axes, -1.01f, 1.01f) && glm::determinant(map_.grid.axes) > 0.0f;
     for (int k = 0; k < 9; ++k)
       turned &= std::abs(square[k / 3][k % 3] - (k % 4 == 0 ? 1.0f : 0.0f)) < 1e-3f;
-    require(turned, "axes", "are no rotation");
+    require(turned, "axes", "are not a rotation");
     require(h.cell > 0.0f && h.cell <= max_coordinate, "cell", "is out of range");
     map_.grid.cell = h.cell;
     require(in(h.person, 0.01f, 10.0f) && h.cells_per_eye_height == walk::cells_per_eye_height,

@@ -69,7 +69,7 @@ void set_value(std::string_view source, std::string_view key, std::string_view v
     link.burst = parse_burst(source, value);
   } else if (key == "congestion") {
     if (value != "cubic" && value != "none")
-      throw InputError(source, "", fmt::format("\"{}\" is no congestion control", value),
+      throw InputError(source, "", fmt::format("\"{}\" is not a congestion control", value),
                        "cubic or none");
     link.cubic = value == "cubic";
   } else {

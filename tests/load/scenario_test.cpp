@@ -86,7 +86,7 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
   expect_refused("[[clients]]\nsessions = 0\n", "line 2: --sessions");
   expect_refused("[[clients]]\nlink = \"speed=1mbit\"\n", "line 2: --link");
   expect_refused("[[clients]]\nsizes = [[1]]\n", "line 2");
-  expect_refused("clients = 3\n", "line 1: clients is no table");
+  expect_refused("clients = 3\n", "line 1: clients is not a table");
   expect_refused("[[clients]]\n[[server.signals]]\nsignal = \"BOOM\"\n", "BOOM");
   expect_refused("[[clients]\n", "line 1");
 }

@@ -19,13 +19,13 @@ Url parse_url(std::string_view text) {
   // A token in the address would end up in logs and in the shell's history.
   if ((!tls && scheme != boost::urls::scheme::ws) || parsed->encoded_host().empty() ||
       parsed->has_userinfo() || parsed->has_query() || parsed->has_fragment()) {
-    throw InputError("--url", "", fmt::format("\"{}\" is no address of a server", text),
+    throw InputError("--url", "", fmt::format("\"{}\" is not an address of a server", text),
                      "like ws://127.0.0.1:8080 or wss://example.org; tokens go to --token");
   }
   if (parsed->has_port() && parsed->port_number() == 0) {
     throw InputError(
         "--url", "",
-        fmt::format("port {} is no number of 1 to 65535", std::string(parsed->port())));
+        fmt::format("port {} is not a number from 1 to 65535", std::string(parsed->port())));
   }
   return {.tls = tls,
           .host = parsed->host_address(),

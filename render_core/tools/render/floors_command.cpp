@@ -50,7 +50,7 @@ SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<Thre
 float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
   if (options.eye_height) {
     if (!(*options.eye_height > 0.0f && *options.eye_height <= 1e6f))
-      throw InputError("--eye-height", "", fmt::format("{} is no height", *options.eye_height),
+      throw InputError("--eye-height", "", fmt::format("{} is not a height", *options.eye_height),
                        "in the scene's units, over 0");
     return *options.eye_height;
   }
@@ -95,7 +95,7 @@ void floors(const FloorsOptions& options, bool quiet) {
     return std::chrono::duration<double>(Clock::now() - t).count();
   };
   if (std::filesystem::path(options.out).extension() != ".walk")
-    throw InputError(options.out, "", "is no name of a .walk file",
+    throw InputError(options.out, "", "is not the name of a .walk file",
                      "the server reads the ground of hall.ply from hall.walk");
   check_writable(options.out);
   const auto pool = std::make_shared<ThreadPool>(options.threads);

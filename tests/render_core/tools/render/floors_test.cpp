@@ -69,7 +69,7 @@ TEST_F(Floors, MistakesAreNamed) {
   EXPECT_THAT(high.out, HasSubstr("nobody can stand"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "room.walk"));
   EXPECT_THAT(run(fmt::format("floors {} {}", path("room.ply"), path("room.png"))).out,
-              HasSubstr("room.png: is no name of a .walk file"));
+              HasSubstr("room.png: is not the name of a .walk file"));
   EXPECT_THAT(run("floors " + path("room.ply")).out,
               HasSubstr("out is required (see catgs-render floors --help)"));
 }
