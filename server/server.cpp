@@ -60,7 +60,7 @@ constexpr std::string_view no_client_page =
 
 /// The client of --client-dir, or the one that was built with this program.
 StaticFiles find_client(const std::string& client_dir) {
-  const std::filesystem::path folder = client_dir.empty() ? built_client() : client_dir;
+  const auto folder = client_dir.empty() ? built_client() : std::filesystem::path(client_dir);
   return folder.empty() ? StaticFiles() : StaticFiles(folder);
 }
 

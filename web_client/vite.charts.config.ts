@@ -8,7 +8,7 @@ const one_file: Plugin = {
     const taken = (name: string): string => {
       const part = bundle[name];
       if (!part) throw new Error(`charts.html: there is no ${name}`);
-      delete bundle[name];
+      Reflect.deleteProperty(bundle, name);
       return part.type === 'chunk' ? part.code : String(part.source);
     };
     const page = bundle['charts.html'];

@@ -51,7 +51,7 @@ it('draws the document inside it, without a server and without anything from els
   page.on('request', (request) => requests.push(request.url()));
   await page.goto(pathToFileURL(file).href);
   await expect.poll(() => page.locator('canvas').count()).toBe(3);
-  expect(await page.locator('td').allTextContents()).toEqual(['<b>bold</b>', '12.35', 'none', '–']);
+  expect(await page.locator('.wide td').allTextContents()).toEqual(['<b>bold</b>', '12.35', 'none', '–']);
   expect(await page.locator('nav a').getAttribute('href')).toBe('/visits.csv');
   const drawn = await page.locator('canvas').evaluateAll((all) =>
     all.map((canvas) => {

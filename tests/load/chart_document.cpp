@@ -206,10 +206,10 @@ std::string with_document(std::string page, const Json& document) {
   if (at == std::string::npos)
     throw InputError("--html", "", "the page of charts has no place for a document",
                      "build the web client of the same version");
-  std::string text = document.dump(-1, ' ', false, Json::error_handler_t::replace);
   // A name in it must not end the element.
-  for (std::size_t i = 0; (i = text.find("</", i)) != std::string::npos; i += 3)
-    text.insert(i + 1, "\\");
+  std::string text;
+  for (const char c : document.dump(-1, ' ', false, Json::error_handler_t::replace))
+    text.append(c == '/' && text.ends_with('<') ? "\\/" : std::string(1, c));
   return page.insert(at + mark.size(), text);
 }
 

@@ -17,11 +17,12 @@ double number(const Json& json, double null_means) {
   return json.is_null() ? null_means : json.get<double>();
 }
 
-std::string series_name(std::string family, const Json& series) {
-  if (family.starts_with("catgs_")) family.erase(0, 6);
-  if (series.contains("buckets") && family.ends_with("_seconds")) family.resize(family.size() - 8);
-  for (const Json& value : series.at("labels")) family += "_" + value.get<std::string>();
-  return family;
+std::string series_name(std::string_view family, const Json& series) {
+  if (family.starts_with("catgs_")) family.remove_prefix(6);
+  if (series.contains("buckets") && family.ends_with("_seconds")) family.remove_suffix(8);
+  std::string name(family);
+  for (const Json& value : series.at("labels")) name.append("_").append(value.get<std::string>());
+  return name;
 }
 
 /// The series of the same labels; null if there is none.

@@ -49,13 +49,13 @@ function series({ curves, bars }: Plot): uPlot.Series[] {
 
 function draw(plot: Plot, host: HTMLElement): void {
   const style = getComputedStyle(host);
-  const axis = (label: string): uPlot.Axis => ({
-    label,
+  const axis = (more: uPlot.Axis): uPlot.Axis => ({
     stroke: style.getPropertyValue('--ink-soft'),
     grid: { stroke: style.getPropertyValue('--line'), width: 1 },
     ticks: { show: false },
-    labelSize: 18,
+    ...more,
   });
+  const half_day_s = 43_200;
   // Each curve has an x of its own.
   const data = uPlot.join(plot.curves.map(({ x, y }) => [[...x], [...y]]));
   new uPlot(
@@ -64,10 +64,15 @@ function draw(plot: Plot, host: HTMLElement): void {
       width: host.clientWidth,
       height: height_px,
       scales: {
-        x: { time: plot.x === 'dates', ...(plot.x === 'log' ? { distr: 3 } : {}) },
+        x: {
+          time: plot.x === 'dates',
+          ...(plot.x === 'log' ? { distr: 3 } : {}),
+          ...(plot.bars ? { range: (_: uPlot, low: number, high: number) => [low - half_day_s, high + half_day_s] } : {}),
+        },
         y: { range: (_, _low, high) => [0, Math.max(high * 1.05, 1e-3)] },
       },
-      axes: [axis(''), axis(plot.unit)],
+      tzDate: (time_s) => uPlot.tzDate(new Date(1e3 * time_s), 'UTC'),
+      axes: [axis({}), axis({ label: plot.unit, labelSize: 18 })],
       series: [{}, ...series(plot)],
     },
     data,
