@@ -8,7 +8,8 @@ export interface Link {
 
 export interface Curve {
   readonly name: string;
-  readonly x: readonly number[];
+  /** Numbers, or dates like 2026-11-27. */
+  readonly x: readonly (number | string)[];
   readonly y: readonly (number | null)[];
   /** A value that must not be exceeded. */
   readonly bound?: boolean;
@@ -18,7 +19,7 @@ export interface Plot {
   readonly title: string;
   readonly unit: string;
   readonly curves: readonly Curve[];
-  /** Linear without it. Dates are seconds since 1970. */
+  /** Linear without it. */
   readonly x?: 'log' | 'dates';
   readonly bars?: boolean;
 }

@@ -57,7 +57,8 @@ function draw(plot: Plot, host: HTMLElement): void {
   });
   const half_day_s = 43_200;
   // Each curve has an x of its own.
-  const data = uPlot.join(plot.curves.map(({ x, y }) => [[...x], [...y]]));
+  const position = (x: number | string): number => (typeof x === 'number' ? x : Date.parse(x) / 1e3);
+  const data = uPlot.join(plot.curves.map(({ x, y }) => [x.map(position), [...y]]));
   new uPlot(
     {
       title: plot.title,
