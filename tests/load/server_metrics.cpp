@@ -9,33 +9,35 @@
 namespace catgs::load {
 namespace {
 
-using Json = nlohmann::json;
+using ServerJson = nlohmann::json;
 using Buckets = std::map<double, double>;  // upper bound in seconds, cumulative count
 
 /// JSON has null for what is no finite number.
-double number(const Json& json, double null_means) {
+double finite_or(const ServerJson& json, double null_means) {
   return json.is_null() ? null_means : json.get<double>();
 }
 
-std::string series_name(std::string_view family, const Json& series) {
+std::string series_name(std::string_view family, const ServerJson& series) {
   if (family.starts_with("catgs_")) family.remove_prefix(6);
   if (series.contains("buckets") && family.ends_with("_seconds")) family.remove_suffix(8);
   std::string name(family);
-  for (const Json& value : series.at("labels")) name.append("_").append(value.get<std::string>());
+  for (const ServerJson& value : series.at("labels"))
+    name.append("_").append(value.get<std::string>());
   return name;
 }
 
 /// The series of the same labels; null if there is none.
-const Json* find_series(const Json& metrics, const std::string& family, const Json& labels) {
+const ServerJson* find_series(const ServerJson& metrics, const std::string& family,
+                              const ServerJson& labels) {
   if (!metrics.contains(family)) return nullptr;
-  for (const Json& series : metrics.at(family))
+  for (const ServerJson& series : metrics.at(family))
     if (series.at("labels") == labels) return &series;
   return nullptr;
 }
 
-void add(const Json& series, double sign, Buckets& buckets) {
-  for (const Json& bucket : series.at("buckets")) {
-    buckets[number(bucket.at(0), std::numeric_limits<double>::infinity())] +=
+void add(const ServerJson& series, double sign, Buckets& buckets) {
+  for (const ServerJson& bucket : series.at("buckets")) {
+    buckets[finite_or(bucket.at(0), std::numeric_limits<double>::infinity())] +=
         sign * bucket.at(1).get<double>();
   }
 }
@@ -55,7 +57,8 @@ double percentile_ms(const Buckets& buckets, double share) {
   return std::nan("");
 }
 
-void add_durations(const std::string& name, const Json& series, const Json* old, Metrics& metrics) {
+void add_durations(const std::string& name, const ServerJson& series, const ServerJson* old,
+                   Metrics& metrics) {
   Buckets buckets;
   add(series, 1.0, buckets);
   double sum_s = series.at("sum");
@@ -71,16 +74,17 @@ void add_durations(const std::string& name, const Json& series, const Json* old,
 
 }  // namespace
 
-Metrics change_between(const Json& before, const Json& after, const std::string& prefix) {
+Metrics change_between(const ServerJson& before, const ServerJson& after,
+                       const std::string& prefix) {
   Metrics metrics;
   for (const auto& [family, all] : after.items())
-    for (const Json& series : all) {
-      const Json* old = find_series(before, family, series.at("labels"));
+    for (const ServerJson& series : all) {
+      const ServerJson* old = find_series(before, family, series.at("labels"));
       const std::string name = prefix + series_name(family, series);
       if (series.contains("buckets")) {
         add_durations(name, series, old, metrics);
       } else {
-        const double value = number(series.at("value"), std::nan(""));
+        const double value = finite_or(series.at("value"), std::nan(""));
         const bool counts = family.ends_with("_total") && old != nullptr;
         metrics.emplace_back(name, counts ? value - old->at("value").get<double>() : value);
       }
