@@ -64,6 +64,19 @@ StaticFiles find_client(const std::string& client_dir) {
   return folder.empty() ? StaticFiles() : StaticFiles(folder);
 }
 
+/// The page asks for its document at its own address with ".json" added.
+HttpResponse charts_page(const StaticFiles& client, HttpRequest request) {
+  request.path = "/charts.html";
+  HttpResponse page = client.respond(request);
+  if (page.status == 404)
+    return text_response(404, "404: this page was not built; /visits.json has the counts\n");
+  // Script and style are inside the page.
+  page.policy =
+      "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+      "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'";
+  return page;
+}
+
 VisitOptions visit_options(const ServerConfig& config) {
   VisitOptions options;
   options.policy.idle_timeout = std::chrono::seconds(config.idle_timeout_s);
@@ -238,6 +251,7 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
   if (request.path == "/api/metrics") return text_response(200, metrics.json(), "application/json");
   if (request.path == "/api/sessions")
     return text_response(200, places->published_json(), "application/json");
+  if (visits_page && request.path == "/visits") return charts_page(client, request);
   if (visits_page)
     if (auto answer = visits_page->respond(request)) return *std::move(answer);
   return text_response(404, "404: /metrics, /visits, /api/metrics and /api/sessions are here\n");
