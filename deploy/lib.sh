@@ -172,12 +172,13 @@ detect_distribution() {
       command -v kubectl >/dev/null || deploy_test_packages+=(kubernetes-client)  # not in Ubuntu
       # Not the default 1.74, whose Asio coroutines break under clang.
       build_packages+=(libboost1.81-dev)
-      test_packages+=(chromium firefox-esr)
+      test_packages+=(libboost-url1.81-dev chromium firefox-esr)
       ;;
     "ubuntu 24.04")
       # Ubuntu's chromium package is a snap, which no container can install; a browser that is
       # already there is used, otherwise the browser tests are skipped with that reason.
       build_packages+=(libboost1.83-dev)
+      test_packages+=(libboost-url1.83-dev)
       ;;
     *)
       fail "$EXIT_UNSUPPORTED" \

@@ -58,15 +58,23 @@ constexpr std::string_view no_client_page =
     "CaT-GS server: the browser client was not built with this server.\n"
     "Configure with -DCATGS_WEB=ON, or give --client-dir.\n";
 
-/// The built client of an installation (prefix/bin) or of a build tree (build/bin).
+/// The client of --client-dir, or the one that was built with this program.
 StaticFiles find_client(const std::string& client_dir) {
-  namespace fs = std::filesystem;
-  if (!client_dir.empty()) return StaticFiles(client_dir);
-  std::error_code error;
-  const fs::path bin = fs::read_symlink("/proc/self/exe", error).parent_path();
-  for (const char* folder : {"../share/catgs/web", "../web_client/dist"})
-    if (fs::exists(bin / folder / "index.html", error)) return StaticFiles(bin / folder);
-  return {};
+  const auto folder = client_dir.empty() ? built_client() : std::filesystem::path(client_dir);
+  return folder.empty() ? StaticFiles() : StaticFiles(folder);
+}
+
+/// The page asks for its document at its own address with ".json" added.
+HttpResponse charts_page(const StaticFiles& client, HttpRequest request) {
+  request.path = "/charts.html";
+  HttpResponse page = client.respond(request);
+  if (page.status == 404)
+    return text_response(404, "404: this page was not built; /visits.json has the counts\n");
+  // Script and style are inside the page.
+  page.policy =
+      "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+      "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'";
+  return page;
 }
 
 VisitOptions visit_options(const ServerConfig& config) {
@@ -240,11 +248,13 @@ HttpResponse Server::State::respond_admin(const HttpRequest& request) {
     metrics.set_loop_stalled(std::string(loop.name), loop.stalled);
   if (request.path == "/metrics")
     return text_response(200, metrics.scrape(), "text/plain; version=0.0.4; charset=utf-8");
+  if (request.path == "/api/metrics") return text_response(200, metrics.json(), "application/json");
   if (request.path == "/api/sessions")
     return text_response(200, places->published_json(), "application/json");
+  if (visits_page && request.path == "/visits") return charts_page(client, request);
   if (visits_page)
     if (auto answer = visits_page->respond(request)) return *std::move(answer);
-  return text_response(404, "404: /metrics, /visits and /api/sessions are here\n");
+  return text_response(404, "404: /metrics, /visits, /api/metrics and /api/sessions are here\n");
 }
 
 void Server::State::count_visits() {

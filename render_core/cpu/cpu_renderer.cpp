@@ -54,12 +54,6 @@ const SimdKernels& choose_kernels(std::string_view simd) {
 
 }  // namespace
 
-std::vector<std::string_view> simd_targets() {
-  std::vector<std::string_view> names;
-  for (const SimdKernels& kernels : simd_kernels()) names.push_back(kernels.name);
-  return names;
-}
-
 std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,
                                             std::string_view simd) {

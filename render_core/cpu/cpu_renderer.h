@@ -8,7 +8,7 @@
 
 namespace catgs {
 
-/// The software core: SIMD and threads. `simd` is "auto" or a name of simd_targets(), in any case;
+/// The software core: SIMD and threads. `simd` is "auto" or a name of simd_kernels(), in any case;
 /// throws InputError on any other name. The cloud is copied into the core's own layout.
 std::unique_ptr<Renderer> make_cpu_renderer(const GaussianCloud& cloud,
                                             std::shared_ptr<ThreadPool> pool,

@@ -80,7 +80,5 @@ class Buffer : public RawBuffer {
 
 template <class T>
 using DeviceBuffer = Buffer<T, false>;
-template <class T>
-using PinnedBuffer = Buffer<T, true>;
 
 }  // namespace catgs::cuda

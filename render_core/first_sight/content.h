@@ -11,7 +11,7 @@
 
 namespace catgs::first_sight {
 
-/// What a view from outside should show: all that hangs together, without what floats around it.
+/// The subject of a view from outside: its large connected parts, without stray Gaussians.
 struct Content {
   Bounds bounds;                  // of the places
   std::vector<glm::vec3> places;  // an even sample of its occupied cells

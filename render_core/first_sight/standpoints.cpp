@@ -34,7 +34,7 @@ std::array<glm::vec3, directions> sphere() {
   return rays;
 }
 
-/// What is seen from a place all around.
+/// The view from a point in all directions.
 struct Surroundings {
   glm::vec3 place;
   float height = 0.0f;                       // above the ground

@@ -11,7 +11,7 @@
 
 namespace catgs::first_sight {
 
-/// What a small picture of a view tells, each in 0…1.
+/// Measures of a small picture of a view, each in 0…1.
 struct Judgement {
   float coverage = 0.0f;  // mean of the light that the scene stops
   float detail = 0.0f;    // mean difference of neighbouring pixels in colour

@@ -65,12 +65,12 @@ struct FrameStats {
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
   std::uint64_t blended_pairs = 0;       // (Gaussian, pixel) pairs blended; see count_pairs
   std::uint64_t tasks = 0;               // parts into which the tiles were cut for the blend
-  // Scenes in pages (TreeFile); see scene/tree/cut.h
+  // Paged scenes (TreeFile); see scene/tree/cut.h
   std::uint32_t nodes = 0;  // clusters drawn
   // Levels of these nodes; 0: leaves.
   int finest_level = 0, coarsest_level = 0;
-  std::uint32_t missing_pages = 0;  // that would refine the picture, of late
-  float coarsest_px = 0.0f;         // the largest error that is drawn for want of them
+  std::uint32_t missing_pages = 0;  // wanted but not resident at the pool's last update
+  float coarsest_px = 0.0f;         // the largest error caused by missing pages
   bool settled = true;              // a camera at rest would see no other picture in the next frame
   // Pipeline::paper
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
@@ -180,8 +180,8 @@ enum class RendererKind { automatic, cpu, cuda, reference };
 
 struct RendererOptions {
   RendererKind kind = RendererKind::automatic;
-  std::shared_ptr<ThreadPool> pool;      // CPU core; null: the Renderer makes its own
-  std::string simd = "auto";             // CPU core: auto or a name of simd_targets()
+  std::shared_ptr<ThreadPool> pool;  // CPU core; null: the Renderer makes its own
+  std::string simd = "auto";         // CPU core: auto or an instruction set that this machine has
   std::shared_ptr<DeviceSet> devices{};  // CUDA core; null: device 0
   // Pools that scenes in pages share; null: each scene has one of its own, of `scene_memory` bytes.
   std::shared_ptr<PagePools> pages{};
@@ -196,10 +196,6 @@ struct MadeRenderer {
   std::unique_ptr<Renderer> renderer;
   std::string reason;  // why this core was chosen, for people to read
 };
-
-/// Instruction sets that the CPU core can use on this machine, best first; the last one, "SCALAR",
-/// uses one lane.
-std::vector<std::string_view> simd_targets();
 
 /// Chooses and builds a core for the scene. Throws InputError where the wanted core cannot run or a
 /// wanted device does not exist.

@@ -54,7 +54,7 @@ CATGS_HD_INLINE auto blend(PixelState<T>& pixel, T exponent, const Vec3<T>& colo
   return live;
 }
 
-/// A pixel for a run of Gaussians in registers. Its transmittance goes on falling behind the
+/// A pixel for a run of Gaussians in registers. Its transmittance continues to fall behind the
 /// Gaussian that finishes it, so the next Gaussian waits for one multiply-add only.
 template <class T>
 struct RunningPixel {
@@ -90,7 +90,7 @@ CATGS_HD_INLINE auto blend(RunningPixel<T>& pixel, T exponent, const Vec3<T>& co
 }
 
 /// Blends one Gaussian over what lies behind, for pixels that stop together: those below
-/// least_shown go on until all are. Returns which pixels are not below it.
+/// least_shown continue until all are. Returns which pixels are not below it.
 template <class T>
 CATGS_HD_INLINE auto blend_on(PixelState<T>& pixel, T exponent, const Vec3<T>& colour) {
   const T weight = alpha_of(exponent) * pixel.transmittance;

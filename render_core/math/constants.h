@@ -47,6 +47,9 @@ inline constexpr int most_occlusion_px = 32;
 /// Limits are moved back by this share of their depth: a surface's depth varies within a part.
 inline constexpr double occlusion_margin = 0.02;
 
+/// The constant spherical-harmonics basis function, 1 / (2 sqrt(pi)).
+inline constexpr double sh_basis_0 = 0.28209479177387814;
+
 /// Side of the square tiles that pixels are binned into.
 inline constexpr int tile_size_px = 16;
 

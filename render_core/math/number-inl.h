@@ -14,7 +14,7 @@ CATGS_BEFORE_MATH();
 namespace catgs {
 namespace CATGS_MATH_NAMESPACE {
 
-// What a number type must offer, for float and double; lanes have the same functions.
+// The functions that a number type must have, for float and double. Lanes have the same ones.
 
 template <class T>
 CATGS_HD_INLINE T select(bool condition, T if_true, T if_false) {

@@ -5,6 +5,7 @@
 #define CATGS_MATH_SPHERICAL_HARMONICS_INL_H
 #endif
 
+#include "render_core/math/constants.h"
 #include "render_core/math/number-inl.h"
 
 CATGS_BEFORE_MATH();
@@ -15,7 +16,7 @@ namespace CATGS_MATH_NAMESPACE {
 /// the Gaussian, world axes), in the order and with the signs of the original 3DGS.
 template <class T>
 CATGS_HD_INLINE void sh_basis(const Vec3<T>& d, int degree, T (&basis)[16]) {
-  basis[0] = T(0.28209479177387814);
+  basis[0] = T(sh_basis_0);
   if (degree < 1) return;
   const T x = d.x, y = d.y, z = d.z;
   basis[1] = T(-0.4886025119029199) * y;

@@ -36,8 +36,8 @@ constexpr double forecast_lever(float near_z) {
 /// the sum of their errors over the sum of the motions, each sample weighed by exp(-age / 0.3 s). A
 /// turn counts by its angle, a shift by the angle under which it appears a lever away. Doubt is 1 -
 /// confidence, and velocity decays as exp(-t doubt / 120 ms). Under a confidence of one half the
-/// horizon shrinks too, to half its length at one quarter. `catgs-render trace forecast` compares
-/// this with other ways to predict.
+/// horizon shrinks too, to half its length at one quarter. MEASURED.md compares this with other
+/// methods.
 ///
 /// Stamps lie within +-2^62 us. Samples may come irregularly and late:
 /// - A sample with a known stamp replaces the earlier one.

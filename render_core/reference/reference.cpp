@@ -21,7 +21,7 @@ namespace catgs {
 namespace {
 
 /// A Gaussian in the image plane.
-struct Splat {
+struct ReferenceSplat {
   float depth;  // decides the order: rounded to float as in every core
   math::Vec2<double> centre_px;
   math::Whitening<double> whitening;
@@ -45,13 +45,13 @@ math::Vec3<double> shade(const GaussianCloud& cloud, std::size_t i,
 
 /// Every Gaussian in front of the near plane that can reach alpha_min, front to back; equal depths
 /// keep the order of the scene.
-std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& request_camera) {
+std::vector<ReferenceSplat> project_all(const GaussianCloud& cloud, const Camera& request_camera) {
   const auto camera = math::make_camera_model(request_camera);
-  std::vector<Splat> splats;
+  std::vector<ReferenceSplat> splats;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const auto mean = to_vec3(cloud.mean[i]);
     const double depth = math::view_depth(camera, mean);
-    Splat splat;
+    ReferenceSplat splat;
     splat.depth = static_cast<float>(depth);
     if (!(splat.depth > request_camera.near_z) || !math::is_kept(camera, mean)) continue;
     const glm::quat& q = cloud.rotation[i];
@@ -68,15 +68,15 @@ std::vector<Splat> project_all(const GaussianCloud& cloud, const Camera& request
     splat.colour = shade(cloud, i, camera.position);
     splats.push_back(splat);
   }
-  std::ranges::stable_sort(splats, {}, &Splat::depth);
+  std::ranges::stable_sort(splats, {}, &ReferenceSplat::depth);
   return splats;
 }
 
-glm::dvec3 render_pixel(std::span<const Splat> splats, glm::ivec2 pixel_px,
+glm::dvec3 render_pixel(std::span<const ReferenceSplat> splats, glm::ivec2 pixel_px,
                         const glm::vec3& background, std::uint64_t& pairs) {
   auto pixel = math::empty_pixel<double>();
   const math::Vec2<double> p{pixel_px.x + 0.5, pixel_px.y + 0.5};
-  for (const Splat& splat : splats) {
+  for (const ReferenceSplat& splat : splats) {
     const double square =
         math::whitened_square(splat.whitening, {p.x - splat.centre_px.x, p.y - splat.centre_px.y});
     if (square > splat.reach) continue;
@@ -117,7 +117,7 @@ PixelColours render_pixels(const GaussianCloud& cloud, const FrameRequest& reque
   };
   PixelColours out;
   const auto start = Clock::now();
-  const std::vector<Splat> splats = project_all(cloud, request.camera);
+  const std::vector<ReferenceSplat> splats = project_all(cloud, request.camera);
   out.stats.visible = static_cast<std::uint32_t>(splats.size());
   out.stats.stage_ms[static_cast<std::size_t>(Stage::project)] = ms_since(start);
 

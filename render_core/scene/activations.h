@@ -6,13 +6,14 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/math/constants.h"
+
 namespace catgs {
 
 // Scene files store what training optimises: logits, logarithms, colours as the coefficient of the
 // constant basis function. These are the maps between that and GaussianCloud's plain values.
 
-/// Value of the constant spherical-harmonics basis function, 1 / (2 sqrt(pi)).
-inline constexpr float sh_c0 = 0.28209479177387814f;
+inline constexpr auto sh_c0 = static_cast<float>(sh_basis_0);
 
 /// The largest float below 1: GaussianCloud's opacities are in (0, 1), and logits over 17 or a byte
 /// of 255 round to 1.

@@ -7,7 +7,8 @@
 namespace catgs::synth {
 namespace {
 
-constexpr float sh_constant = 0.28209479f;  // basis function 0: colour = 0.5 + 0.282 sh_0 + …
+// One rounding step below sh_basis_0: another value would change the bytes of every made scene.
+constexpr float sh_constant = 0.28209479f;
 
 }  // namespace
 

@@ -35,9 +35,7 @@ void add_info_command(CLI::App& app);
 void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
-void add_walk_command(CLI::App& app);
-// Subcommands of `trace`, which adds them.
-void add_trace_forecast_command(CLI::App& trace);
+/// A subcommand of `trace`, which adds it.
 void add_trace_windows_command(CLI::App& trace);
 
 }  // namespace catgs

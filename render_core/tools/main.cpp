@@ -34,7 +34,6 @@ int run(int argc, char** argv) {
   add_paper_command(app);
   add_synth_command(app);
   add_trace_command(app);
-  add_walk_command(app);
 
   try {
     parse_command_line(app, argc, argv);

@@ -47,7 +47,7 @@ std::optional<glm::vec3> up_of(const SceneOptions& options) {
   if (!options.up) return std::nullopt;
   const std::optional<glm::vec3> up = axis_named(*options.up);
   if (!up)
-    throw InputError("--up", "", fmt::format("\"{}\" is no axis", *options.up),
+    throw InputError("--up", "", fmt::format("\"{}\" is not an axis", *options.up),
                      "one of +x, -x, +y, -y, +z and -z; a sidecar takes any direction");
   return up;
 }
@@ -120,7 +120,7 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
     const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
     camera.clip = {glm::vec3(plane[0], plane[1], plane[2]), static_cast<float>(plane[3])};
     if (camera.clip.normal == glm::vec3(0.0f))
-      throw InputError("--clip", "", "has a normal of 0, which is no direction",
+      throw InputError("--clip", "", "has a normal of 0, which is not a direction",
                        "NX,NY,NZ points to what is left out, like 0,1,0");
   }
   return camera;

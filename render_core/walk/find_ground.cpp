@@ -177,7 +177,7 @@ class Collector {
         {static_cast<std::uint32_t>(at.y * size_.x + at.x), surfaces_.height(i), kind});
   }
 
-  /// What stands in the way of a body on ground of this height.
+  /// Adds the obstacle that blocks a body on ground of this height.
   void add_obstacle(const glm::ivec2& column, float height, std::vector<Found>& to) const {
     turns_.next();
     const glm::ivec2 at = column - surfaces_.extent().min;

@@ -12,7 +12,7 @@ namespace catgs::walk {
 /// Cells of a grid per eye height. All sizes of a person are constants in cells for that reason.
 inline constexpr float cells_per_eye_height = 16.0f;
 
-/// Who walks: an upright cylinder. Lengths are shares of the eye height.
+/// A walking person: an upright cylinder. Lengths are shares of the eye height.
 struct Person {
   float radius = 0.15f;
   float height = 1.08f;

@@ -21,7 +21,7 @@
 namespace catgs::walk {
 namespace {
 
-struct Header {
+struct WalkFileHeader {
   static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 'w', 'l', 'k'};
   static constexpr std::uint32_t right_version = 2;
 
@@ -41,7 +41,7 @@ struct Header {
   std::uint32_t storeys = 0;
   std::array<Storey, most_storeys> storey{};
 };
-static_assert(sizeof(Storey) == 12 && sizeof(Header) == 320);
+static_assert(sizeof(Storey) == 12 && sizeof(WalkFileHeader) == 320);
 
 /// An entry of the index.
 struct TileBytes {
@@ -51,7 +51,8 @@ struct TileBytes {
 constexpr std::string_view damaged = "the file is damaged: compute it again";
 
 std::uint32_t checksum_of(std::span<const std::byte> bytes) {
-  constexpr std::size_t skipped = offsetof(Header, checksum) + sizeof(Header::checksum);
+  constexpr std::size_t skipped =
+      offsetof(WalkFileHeader, checksum) + sizeof(WalkFileHeader::checksum);
   const std::span rest = bytes.subspan(skipped);
   return static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const Bytef*>(rest.data()), rest.size()));
@@ -86,11 +87,11 @@ class Reader {
     constexpr std::uint64_t most_bytes = std::uint64_t{1} << 27;
     const std::vector<std::byte> bytes = file_.read_all(most_bytes);
     require(bytes.size() >= sizeof header_, "header", "is cut off");
-    header_ = load_as<Header>(bytes.data());
-    if (header_.magic != Header::right_magic)
+    header_ = load_as<WalkFileHeader>(bytes.data());
+    if (header_.magic != WalkFileHeader::right_magic)
       throw InputError(file_.name(), "magic", "is not that of a .walk file",
                        "catgs-render floors SCENE OUT.walk makes one");
-    if (header_.version != Header::right_version)
+    if (header_.version != WalkFileHeader::right_version)
       throw InputError(file_.name(), "version", "is not known", "compute it with this version");
     require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");
     read_header();
@@ -98,7 +99,7 @@ class Reader {
             "are not those behind the header");
     read_tiles(std::span(bytes).subspan(sizeof header_));
     const glm::ivec2 start(glm::floor(map_.start.place));
-    require(map_.clear_at(start, map_.start.height), "start", "is no clear ground");
+    require(map_.clear_at(start, map_.start.height), "start", "is not clear ground");
     return std::move(map_);
   }
 
@@ -108,7 +109,7 @@ class Reader {
   }
 
   void read_header() {
-    const Header& h = header_;
+    const WalkFileHeader& h = header_;
     const auto in = [](const auto& values, float low, float high) {
       return std::ranges::all_of(values, [&](float v) { return v >= low && v <= high; });
     };
@@ -119,7 +120,7 @@ class Reader {
     bool turned = in(h.axes, -1.01f, 1.01f) && glm::determinant(map_.grid.axes) > 0.0f;
     for (int k = 0; k < 9; ++k)
       turned &= std::abs(square[k / 3][k % 3] - (k % 4 == 0 ? 1.0f : 0.0f)) < 1e-3f;
-    require(turned, "axes", "are no rotation");
+    require(turned, "axes", "are not a rotation");
     require(h.cell > 0.0f && h.cell <= max_coordinate, "cell", "is out of range");
     map_.grid.cell = h.cell;
     require(in(h.person, 0.01f, 10.0f) && h.cells_per_eye_height == walk::cells_per_eye_height,
@@ -250,7 +251,7 @@ class Reader {
   }
 
   const ByteSource& file_;
-  Header header_;
+  WalkFileHeader header_;
   WalkMap map_;
 };
 
@@ -297,7 +298,7 @@ std::string packed_tiles(std::span<const std::string> tiles) {
 std::string pack(const WalkMap& map) {
   assert(map.places.size() <= most_places);
   const std::string tiles = packed_tiles(tiles_of(map));
-  Header h;
+  WalkFileHeader h;
   std::memcpy(h.origin.data(), &map.grid.origin, sizeof h.origin);
   std::memcpy(h.axes.data(), &map.grid.axes, sizeof h.axes);
   h.cell = map.grid.cell;

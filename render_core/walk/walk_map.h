@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,7 +12,7 @@
 
 namespace catgs::walk {
 
-/// What a column has at a height.
+/// The contents of a column at a height.
 enum class Kind : std::uint8_t {
   clear,    // ground for a person's axis: the whole body has room
   near,     // ground, but less than a body's radius from an edge or an obstacle
@@ -70,9 +69,5 @@ struct WalkMap {
   /// The index in `storeys` of a height.
   [[nodiscard]] std::size_t storey_at(float height) const;
 };
-
-/// Height of the ground (cells) at `place` for a walker whose ground was `height`: bilinear between
-/// the middles of cells. Empty where no clear ground is within a step.
-std::optional<float> ground_at(const WalkMap& map, const glm::vec2& place, float height);
 
 }  // namespace catgs::walk

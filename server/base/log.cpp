@@ -142,7 +142,7 @@ class PromptSink final : public spdlog::sinks::base_sink<std::mutex> {
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
     if (lost_ > 0) {
-      const LogsOwnLine own(fmt::format("{} lines were lost: standard error took none", lost_));
+      const LogsOwnLine own(fmt::format("{} log lines were dropped: stderr was blocked", lost_));
       if (write(own.message(message.logger_name))) lost_ = 0;
     }
     if (lost_ == 0 && write(message)) return;

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include <nlohmann/json.hpp>
 #include <prometheus/text_serializer.h>
 
 #include "render_core/base/build_info.h"
@@ -61,7 +62,7 @@ prometheus::Histogram& Metrics::latency(const char* name, const char* help) {
       {}, latency_buckets_s);
 }
 
-std::string Metrics::scrape() const {
+std::vector<prometheus::MetricFamily> Metrics::families() const {
   auto families = registry_.Collect();
   std::ranges::move(process_metrics(), std::back_inserter(families));
   {
@@ -75,7 +76,28 @@ std::string Metrics::scrape() const {
                       "not take them (a full disk, a pipe that nobody reads)",
                       prometheus::MetricType::Counter,
                       {lost}});
-  return prometheus::TextSerializer().Serialize(families);
+  return families;
+}
+
+std::string Metrics::scrape() const { return prometheus::TextSerializer().Serialize(families()); }
+
+std::string Metrics::json() const {
+  nlohmann::json all;
+  for (const prometheus::MetricFamily& family : families())
+    for (const prometheus::ClientMetric& metric : family.metric) {
+      nlohmann::json series{{"labels", nlohmann::json::object()}};
+      for (const auto& label : metric.label) series["labels"][label.name] = label.value;
+      if (family.type == prometheus::MetricType::Histogram) {
+        series["sum"] = metric.histogram.sample_sum;
+        for (const auto& bucket : metric.histogram.bucket)  // the last bound, infinity, is null
+          series["buckets"].push_back({bucket.upper_bound, bucket.cumulative_count});
+      } else {
+        const bool counts = family.type == prometheus::MetricType::Counter;
+        series["value"] = counts ? metric.counter.value : metric.gauge.value;
+      }
+      all[family.name].push_back(std::move(series));
+    }
+  return all.dump();
 }
 
 void Metrics::set_views(int device, int views) {

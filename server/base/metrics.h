@@ -27,6 +27,9 @@ class Metrics {
 
   /// Returns a scrape in text format: our metrics and the standard process metrics.
   [[nodiscard]] std::string scrape() const;
+  /// The same as JSON: series by family, each with its labels and a value, or the sum and the
+  /// cumulative buckets of a histogram.
+  [[nodiscard]] std::string json() const;
 
   /// Sets the current number of Views on a CUDA device.
   void set_views(int device, int views);
@@ -38,6 +41,7 @@ class Metrics {
   void set_encoder_sessions(const std::string& encoder, int count);
 
  private:
+  [[nodiscard]] std::vector<prometheus::MetricFamily> families() const;
   prometheus::Gauge& gauge(const char* name, const char* help,
                            const prometheus::Labels& labels = {});
   prometheus::Counter& counter(const char* name, const char* help,

@@ -6,27 +6,17 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "server/base/scene_id.h"
 
 namespace catgs {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr int usual_days = 30;
 constexpr std::int64_t seconds_a_day = 86'400;
-
-constexpr std::string_view style =
-    R"(:root { color-scheme: light dark; --bar: #2a78d6; --line: #8888; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
-table { border-collapse: collapse; width: 100%; }
-th, td { text-align: right; padding: .3rem .6rem; border-bottom: 1px solid var(--line); }
-th:first-child, td:first-child { text-align: left; }
-svg { width: 100%; height: auto; } svg rect { fill: var(--bar); }
-svg text { font-size: 11px; fill: currentColor; } svg line { stroke: var(--line); }
-.wide { overflow-x: auto; }
-@media (prefers-color-scheme: dark) { :root { --bar: #6aa9f4; } }
-)";
 
 std::string argument(const HttpRequest& request, std::string_view name) {
   for (const std::string& given : request.arguments)
@@ -51,47 +41,36 @@ std::string csv_text(std::string_view text) {
   return out + '"';
 }
 
-/// A bar for each day, up to `top`. `text`: of the highest bar.
-std::string plot(const std::vector<std::pair<std::string, double>>& values,
-                 const std::string& unit) {
-  constexpr double width = 900, height = 180, left = 50, bottom = 20, above = 10;
-  double top = 0.0;
-  for (const auto& [date, value] : values) top = std::max(top, value);
-  std::string out = fmt::format(
-      "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{} by day\">\n", width, height, unit);
-  const double plot_height = height - bottom - above;
-  const double step = (width - left) / static_cast<double>(values.size());
-  out += fmt::format("<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" />\n", left, width,
-                     height - bottom);
-  for (std::size_t i = 0; i < values.size() && top > 0.0; ++i) {
-    const double bar = plot_height * values[i].second / top;
-    out += fmt::format(
-        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"><title>{}: "
-        "{:.4g}</title></rect>\n",
-        left + step * static_cast<double>(i), height - bottom - bar, std::max(1.0, 0.8 * step), bar,
-        values[i].first, values[i].second);
+/// A bar for each day.
+Json plot(const std::string& title, const std::vector<std::pair<std::string, double>>& values) {
+  Json curve = {{"name", title}, {"x", Json::array()}, {"y", Json::array()}};
+  for (const auto& [date, value] : values) {
+    curve["x"].push_back(date);
+    curve["y"].push_back(value);
   }
-  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{:.2g}</text>\n", left - 6,
-                     above + 8, top);
-  out += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", left, height - 5, values.front().first);
-  out += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{}</text>\n", width, height - 5,
-                     values.back().first);
-  return out + "</svg>\n";
+  return {{"title", title},
+          {"unit", ""},
+          {"x", "dates"},
+          {"bars", true},
+          {"curves", Json::array({std::move(curve)})}};
+}
+
+Json link(const std::string& text, const std::string& href) {
+  return {{"text", text}, {"href", href}};
 }
 
 double per_visit(double value, std::uint64_t visits) {
   return visits == 0 ? 0.0 : value / static_cast<double>(visits);
 }
 
-std::string scene_row(const std::string& name, const SceneCounts& counts) {
+Json scene_row(Json name, const SceneCounts& counts) {
   const double hours = counts.seconds / 3600.0;
-  std::string out =
-      fmt::format("<tr><td>{}</td><td>{}</td><td>{:.1f}</td><td>{:.1f}</td><td>{:.0f}</td>", name,
-                  counts.visits, hours, per_visit(counts.seconds / 60.0, counts.visits),
-                  hours > 0.0 ? 1e-6 * static_cast<double>(counts.bytes) / hours : 0.0);
+  Json row = {std::move(name), counts.visits, hours,
+              per_visit(counts.seconds / 60.0, counts.visits),
+              hours > 0.0 ? 1e-6 * static_cast<double>(counts.bytes) / hours : 0.0};
   for (std::size_t i = 1; i <= device_kinds; ++i)  // unknown devices last
-    out += fmt::format("<td>{}</td>", counts.devices[i % device_kinds]);
-  return out + "</tr>\n";
+    row.push_back(counts.devices[i % device_kinds]);
+  return row;
 }
 
 /// Titles are for people; without one, the number stands.
@@ -171,7 +150,7 @@ std::string stops_rows(const std::string& date, const DayCounts& day,
   return out;
 }
 
-/// What the page shows of some days, of all scenes or of one.
+/// The counts of some days, of all scenes or of one.
 struct Summary {
   std::string only;  // a scene's id; empty: all
   DayCounts scenes{};
@@ -194,45 +173,50 @@ struct Summary {
   }
 };
 
-std::string html_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
+/// For charts.html of the web client.
+std::string json_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
   const std::size_t days = all.visits.size();
-  const std::string what = all.only.empty() ? "all scenes" : escape_html(name_in(all.only));
-  std::string out = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\" />"
-      "<meta name=\"viewport\" content=\"width=device-width\" /><title>Visits</title>"
-      "<link rel=\"stylesheet\" href=\"/visits.css\" /></head><body>\n"
-      "<h1>Visits: {}, {} days</h1>\n<p>{} visits, {:.1f} hours. ",
-      what, days, all.sum.visits, all.sum.seconds / 3600.0);
+  Json links = Json::array(), rows = Json::array();
   for (const int other : {7, 30, 90, 400})
-    out += fmt::format("<a href=\"/visits?days={}\">{} days</a> · ", other, other);
-  out += "<a href=\"/visits.csv\">CSV</a> · <a href=\"/visits/stops.csv\">CSV of stops</a></p>\n";
-  out += "<h2>Visits by day</h2>\n" + plot(all.visits, "visits");
-  out += "<h2>Hours by day</h2>\n" + plot(all.hours, "hours");
-  out +=
-      "<h2>Scenes</h2>\n<div class=\"wide\"><table><tr><th>Scene</th><th>Visits</th>"
-      "<th>Hours</th><th>Minutes a visit</th><th>MB an hour</th><th>Desktop</th><th>Phone</th>"
-      "<th>Tablet</th><th>Headset</th><th>Unknown</th></tr>\n";
+    links.push_back(link(fmt::format("{} days", other), fmt::format("/visits?days={}", other)));
+  links.push_back(link("CSV", "/visits.csv"));
+  links.push_back(link("CSV of stops", "/visits/stops.csv"));
   for (const auto& [id, counts] : all.scenes)
-    out += scene_row(fmt::format("<a href=\"/visits?days={}&amp;scene={}\">{}</a>", days,
-                                 escape_html(percent_encoded(id)), escape_html(name_in(id))),
-                     counts);
-  out += "</table></div>\n";
-  const auto shown = all.scenes.find(all.only);
-  if (shown == all.scenes.end()) return out + "</body></html>\n";
-  out +=
-      "<h2>Stops</h2>\n<table><tr><th>Tour</th><th>Stop</th><th>Visits that reached it</th>"
-      "</tr>\n";
-  const VisitsPage::Titles titles = titles_of(all.only);
-  for (const auto& [stop, reached] : shown->second.stops) {
-    const auto [tour, title] = stop_titles(titles, stop);
-    out += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", escape_html(tour),
-                       escape_html(title), reached);
+    rows.push_back(scene_row(
+        link(name_in(id), fmt::format("/visits?days={}&scene={}", days, percent_encoded(id))),
+        counts));
+  Json parts = Json::array();
+  parts.push_back({{"heading", "By day"},
+                   {"plots", Json::array({plot("Visits", all.visits), plot("Hours", all.hours)})}});
+  parts.push_back({{"heading", "Scenes"},
+                   {"table",
+                    {{"columns",
+                      {"Scene", "Visits", "Hours", "Minutes a visit", "MB an hour", "Desktop",
+                       "Phone", "Tablet", "Headset", "Unknown"}},
+                     {"rows", std::move(rows)}}}});
+  if (const auto shown = all.scenes.find(all.only); shown != all.scenes.end()) {
+    const VisitsPage::Titles titles = titles_of(all.only);
+    Json stops = Json::array();
+    for (const auto& [stop, reached] : shown->second.stops) {
+      const auto [tour, title] = stop_titles(titles, stop);
+      stops.push_back({tour, title, reached});
+    }
+    parts.push_back(
+        {{"heading", "Stops"},
+         {"table",
+          {{"columns", {"Tour", "Stop", "Visits that reached it"}}, {"rows", std::move(stops)}}}});
   }
-  return out + "</table>\n</body></html>\n";
+  const Json document = {
+      {"title", fmt::format("Visits: {}, {} days",
+                            all.only.empty() ? "all scenes" : name_in(all.only), days)},
+      {"facts", fmt::format("{} visits, {:.1f} hours", all.sum.visits, all.sum.seconds / 3600.0)},
+      {"links", std::move(links)},
+      {"parts", std::move(parts)}};
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-DayByDay::Parts page_parts(const HttpRequest& request, std::int64_t unix_s,
-                           const VisitsPage::TitlesOf& titles_of) {
+DayByDay::Parts summary_parts(const HttpRequest& request, std::int64_t unix_s,
+                              const VisitsPage::TitlesOf& titles_of) {
   DayByDay::Parts parts;
   parts.dates = [days = days_of(request), unix_s] {
     std::vector<std::string> dates;
@@ -245,21 +229,20 @@ DayByDay::Parts page_parts(const HttpRequest& request, std::int64_t unix_s,
     summary->take(date, day);
     return std::string();
   };
-  parts.end = [summary, titles_of] { return html_of(*summary, titles_of); };
+  parts.end = [summary, titles_of] { return json_of(*summary, titles_of); };
   return parts;
 }
 
 }  // namespace
 
 std::optional<HttpResponse> VisitsPage::respond(const HttpRequest& request) const {
-  if (request.path == "/visits.css") return text_response(200, std::string(style), "text/css");
   DayByDay::Parts parts;
   parts.dates = [&book = book_] { return book.dates(); };
   HttpResponse response;
   response.content_type = "text/csv; charset=utf-8";
-  if (request.path == "/visits") {
-    parts = page_parts(request, unix_s_(), titles_of_);
-    response.content_type = "text/html; charset=utf-8";
+  if (request.path == "/visits.json") {
+    parts = summary_parts(request, unix_s_(), titles_of_);
+    response.content_type = "application/json";
   } else if (request.path == "/visits.csv") {
     parts.head =
         fmt::format("date,scene,visits,seconds,bytes,{}\r\n", fmt::join(device_names, ","));

@@ -14,8 +14,9 @@
 
 namespace catgs {
 
-/// The pages of the admin port that show counts: "/visits", "/visits.csv" and "/visits/stops.csv".
-/// Network thread. Days are read while an answer is sent, one at a time, on other threads.
+/// The counts on the admin port: "/visits.json", which charts.html shows as "/visits",
+/// "/visits.csv" and "/visits/stops.csv". Network thread. Days are read while an answer is sent,
+/// one at a time, on other threads.
 class VisitsPage {
  public:
   using Titles = std::shared_ptr<const std::vector<TourTitles>>;

@@ -285,18 +285,4 @@ std::string codec_string(const Sps& sps) {
   return text.data();
 }
 
-std::optional<SliceHead> parse_slice_head(NalUnit slice) {
-  if (slice.type() != NalType::slice && slice.type() != NalType::idr_slice) return std::nullopt;
-  // Two ue(v) of at most 32 bits: 16 bytes hold them, emulation prevention included.
-  const auto payload = slice.bytes.subspan(1);
-  const std::vector<byte> raw = unescape(payload.first(std::min<std::size_t>(payload.size(), 16)));
-  BitReader reader(raw);
-  SliceHead head;
-  head.first_mb = reader.exp_golomb();
-  const std::uint32_t type = reader.exp_golomb();
-  if (reader.failed() || type > 9) return std::nullopt;
-  head.type = static_cast<SliceType>(type % 5);
-  return head;
-}
-
 }  // namespace catgs::h264

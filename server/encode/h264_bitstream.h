@@ -12,7 +12,7 @@
 namespace catgs::h264 {
 
 // The part of ITU-T H.264 (08/2021) that a server must read and write by itself: NAL units in Annex
-// B byte streams, sequence parameter sets and the head of a slice. Pure functions on bytes;
+// B byte streams and sequence parameter sets. Pure functions on bytes;
 // malformed input gives nullopt, never a read past the end.
 
 enum class NalType : std::uint8_t {
@@ -88,15 +88,5 @@ std::optional<std::vector<std::byte>> with_zero_reorder_frames(NalUnit sps);
 
 /// "avc1.PPCCLL" (RFC 6381): profile, constraint flags and level in hexadecimal.
 std::string codec_string(const Sps& sps);
-
-enum class SliceType { p, b, i, sp, si };
-
-struct SliceHead {
-  unsigned first_mb = 0;  // 0 begins a picture
-  SliceType type = SliceType::i;
-};
-
-/// Reads the head of a slice or IDR slice NAL unit (7.3.3).
-std::optional<SliceHead> parse_slice_head(NalUnit slice);
 
 }  // namespace catgs::h264

@@ -76,6 +76,15 @@ std::shared_ptr<const std::string> gzip(const std::string& bytes) {
 
 }  // namespace
 
+std::filesystem::path built_client() {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path bin = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (const char* folder : {"../share/catgs/web", "../web_client/dist"})
+    if (fs::exists(bin / folder / "index.html", error)) return bin / folder;
+  return {};
+}
+
 StaticFiles::StaticFiles(const std::filesystem::path& folder) {
   namespace fs = std::filesystem;
   const std::string source = "--client-dir " + folder.string();

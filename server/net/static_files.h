@@ -11,6 +11,10 @@
 
 namespace catgs {
 
+/// The folder of the built client of an installation (prefix/bin) or of a build tree (build/bin);
+/// empty if there is none.
+std::filesystem::path built_client();
+
 /// Serves the browser client from memory. Requests are looked up in a map and never touch the file
 /// system, so no path from the wire can leave the folder.
 class StaticFiles {

@@ -58,7 +58,6 @@ std::vector<std::uint64_t> PacketRing::push(OutgoingFrame frame) {
     frame_bytes_ += size;
     packets_.push_back({frame.ticket, std::move(frame.bitstream), Topic::event});
   }
-  dropped_frames_ += dropped.size();
   return dropped;
 }
 

@@ -13,7 +13,7 @@ namespace catgs {
 /// The bounded queue of messages and frames for one socket, in order. It is bounded in number and
 /// bytes:
 /// - frames: overflow drops every waiting frame and refuses new ones up to the next IDR. A decoder
-///   cannot use a P-frame without its predecessor. Each dropped frame is counted.
+///   cannot use a P-frame without its predecessor.
 /// - messages: a newer one replaces those on the same topic that no frame follows. No other message
 ///   is dropped. Overflow means that the peer does not read, and the owner closes the connection.
 /// Not thread-safe.
@@ -44,7 +44,6 @@ class PacketRing {
   [[nodiscard]] bool empty() const { return packets_.empty(); }
   [[nodiscard]] std::size_t frames() const { return frames_; }
   [[nodiscard]] std::size_t frame_bytes() const { return frame_bytes_; }
-  [[nodiscard]] std::uint64_t dropped_frames() const { return dropped_frames_; }
 
  private:
   void drop_waiting_frames(std::vector<std::uint64_t>& dropped);
@@ -55,7 +54,6 @@ class PacketRing {
   std::size_t frames_ = 0;
   std::size_t frame_bytes_ = 0;
   std::size_t message_bytes_ = 0;
-  std::uint64_t dropped_frames_ = 0;
   bool waiting_for_idr_ = false;
 };
 

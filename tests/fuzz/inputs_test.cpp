@@ -1,5 +1,5 @@
-// What fuzzing has found stays mended, what it has reached is reached, and mutants of all that
-// break nothing: without libFuzzer, with every compiler and sanitizer of ours.
+// Findings of fuzzing stay fixed, inputs of the corpus reach their code, and mutants of all that
+// break nothing. This runs without libFuzzer, with every compiler and sanitizer.
 #include <chrono>
 #include <cmath>
 #include <cstdint>

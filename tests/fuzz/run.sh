@@ -11,7 +11,7 @@ usage: tests/fuzz/run.sh SECONDS [TARGET...]
 
 The first form gives each target (default: all) an equal part of SECONDS. The second runs them in turn, a
 minute at a time, until each has found no new edge for QUIET_SECONDS of its own time; it can be stopped at
-any time and goes on where it was. The third puts the fewest inputs that reach every edge reached so far
+any time, and the next run resumes there. The third puts the fewest inputs that reach every edge reached so far
 into tests/fuzz/corpus, where all runs begin, 64 KiB a target at most.
 
 Inputs that reach new code are kept in build/fuzz/runs/TARGET/corpus and used by later runs. What ends a

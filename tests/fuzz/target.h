@@ -27,8 +27,8 @@ struct Target {
   std::map<std::string, std::string> (*seeds)();
   /// Words of the format, which mutation would hardly find by itself.
   std::vector<std::string> dictionary;
-  /// Changes an input as its format is built, where bytes alone seldom make what a parser goes on
-  /// to read; null where they do.
+  /// Changes an input as its format is built, for formats where random bytes seldom pass the
+  /// parser's first checks; null for others.
   Change change = nullptr;
   /// Longer inputs hold nothing new for this parser.
   std::size_t max_bytes = 4096;

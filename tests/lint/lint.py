@@ -3,7 +3,7 @@
 
   lint.py rules              layering and number of includes, banned calls, friend classes, file length,
                              marker words, include guards, links between documents, what the security
-                             pages name
+                             pages name, idioms
   lint.py declarations       universal-ctags: long functions, large classes, names and headers that
                              nothing uses
   lint.py shell              shellcheck over every script
@@ -52,7 +52,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "render_core/metrics render_core/reference render_core/cpu render_core/cuda render_core/walk", "render_core",
     "render_core/first_sight", "render_core/scene/files", "render_core/synth", "render_core/tools",
     "render_core/tools/bench render_core/tools/render render_core/tools/trace",
-    "render_core/tools/paper render_core/tools/walk",
+    "render_core/tools/paper",
     "server/base", "server/encode", "server/pipeline", "server/net", "server/config server/access server/flow server/media",
     "server/scenes server/schedule server/counts", "server/visit server/films", "server",
     "web_client/src/base web_client/src/text web_client/src/wire",
@@ -129,6 +129,11 @@ MAX_IMPORTS = 20
 MORE_IMPORTS = {
     "server/server.cpp": 27,
 }
+
+# Folders whose English is plain. Others follow.
+PLAIN = re.compile(r"^(render_core|tests/(render_core|load|fuzz|bench|support))/")
+IDIOMS = re.compile(r"\b(of late|for want of|(is|are|was|were) told|go(es)? on)\b", re.IGNORECASE)
+NO_CLAIM = re.compile(r"(Of|Who|That|What)[A-Z]")
 
 # Pages whose tables name constants of the sources, and tests.
 SECURITY_PAGES = ("deploy/SECURITY.md", "deploy/FAULTS.md", "deploy/LIMITS.md")
@@ -212,6 +217,19 @@ def rule_findings(path: str, lines: list[str]) -> Iterator[str]:
     yield from import_findings(path, targets)
 
 
+def english_findings(path: str, lines: list[str]) -> Iterator[str]:
+    """Idioms that readers stumble over, and names of tests that claim nothing, as 'file:line: text'."""
+    if not PLAIN.search(path):
+        return
+    for number, line in enumerate(lines, start=1):
+        if idiom := IDIOMS.search(line):
+            yield f"{path}:{number}: \"{idiom.group()}\": say it in plain words"
+    text = "\n".join(lines)
+    for test in CXX_TEST.finditer(text):
+        if NO_CLAIM.match(test.group(2)):
+            yield f"{path}:{text.count(chr(10), 0, test.start()) + 1}: {test.group(2)}: a test's name is a claim"
+
+
 def link_findings(root: pathlib.Path, path: str, lines: list[str]) -> Iterator[str]:
     """Links of a Markdown file that lead to no file, as 'file:line: text'."""
     for number, line in enumerate(lines, start=1):
@@ -245,6 +263,7 @@ def check_rules(root: pathlib.Path) -> int:
             continue
         lines = (root / path).read_text("utf-8").splitlines()
         findings += link_findings(root, path, lines) if is_document else rule_findings(path, lines)
+        findings += english_findings(path, lines)
         if CXX.search(path):
             code[path] = "\n".join(lines)
     for page in SECURITY_PAGES:

@@ -104,6 +104,20 @@ class RuleFindings(unittest.TestCase):
         self.expect_one("becomes code", "tests/a.py", "subprocess.run(line, shell=True)")
         self.assertEqual(self.findings("server/a.cpp", "  io.system(1); // rand()", "  fmt::gmtime(t);"), [])
 
+    def test_english(self):
+        def findings(*lines, path="render_core/a.md"):
+            return list(lint.english_findings(path, list(lines)))
+
+        self.assertEqual(findings("It runs.", "told", path="render_core/a.h"), [])
+        for line in ("pages that were missing of late", "drawn for want of them", "It is told so.", "which goes on"):
+            self.assertEqual(len(findings("", line)), 1, line)
+            self.assertEqual(findings(line, path="deploy/a.md"), [], "not yet plain")
+        for name in ("OfNothingIsNothing", "WhoIsLateWaits", "ThatIsSo", "WhatIsRead"):
+            for declaration in (f"TEST(A, {name}) {{", f"TEST_F(A,\n       {name}) {{"):
+                found = findings("", *declaration.split("\n"), path="tests/load/a.cpp")
+                self.assertEqual(found, [f"tests/load/a.cpp:2: {name}: a test's name is a claim"])
+        self.assertEqual(findings("TEST(A, OfferIsTaken) {", path="tests/load/a.cpp"), [])
+
     def test_links(self):
         root = pathlib.Path(__file__).parent
         lines = ["[here](lint.py) [web](https://x.org/y) [part](#a)", "![gone](media/gone.webp)"]

@@ -166,8 +166,8 @@ asio::awaitable<void> Connection::send_poses() {
   co_await wait_until(clock_time(settings_.stop_us + 2'000'000));  // for the outbox to end it all
 }
 
-/// As a browser whose visitor looks: at the next refresh it says that nothing moves, then there are
-/// no poses, and the way goes on from here.
+/// Behaves like a browser whose visitor stands still: at the next refresh it says that nothing
+/// moves. It then sends no poses, and the path continues from here.
 asio::awaitable<void> Connection::rest() {
   constexpr std::int64_t refresh_us = 16'667;
   if (!state_.last_pose) co_return;

@@ -14,7 +14,7 @@
 
 namespace catgs::load {
 
-/// What survives a lost connection.
+/// State that survives a lost connection.
 struct SessionState {
   std::string resume_token;
   std::optional<v1::PoseSample> last_pose;

@@ -20,11 +20,11 @@ namespace catgs::load {
 
 /// Where a session decodes what it received, one frame after the other: really (`decode`; with
 /// `only_pictures` from an IDR at the time of a picture until that is kept), or only for as long as
-/// it would take (`decode_time_s`). Bounded: what does not fit is dropped, and decoding goes on
-/// with the next IDR.
+/// it would take (`decode_time_s`). Bounded: what does not fit is dropped, and decoding
+/// resumes at the next IDR.
 class DecodeStage {
  public:
-  /// What a decoder tells its session.
+  /// A decoder's calls to its session.
   struct Callbacks {
     std::function<void(const v1::Ack& ack, std::int64_t presented_us)> acknowledge;
     std::function<void()> request_idr;
@@ -36,7 +36,7 @@ class DecodeStage {
   /// The next frame is to be taken. False: nobody needs it decoded.
   [[nodiscard]] bool has_work() const;
   void take(const FrameMessage& frame, const v1::Ack& ack);
-  /// Of the scene that frames show from here on; for the pictures that are kept.
+  /// Sets the scene of the following frames, for the pictures that are kept.
   void set_scene(const v1::SceneFacts& scene) { scene_ = scene; }
   /// Decodes until it is cancelled. Throws InputError where a decoder is missing.
   boost::asio::awaitable<void> run();

@@ -17,7 +17,7 @@ namespace {
 constexpr std::int64_t min_retransmission_timeout_us = 200'000;  // Linux's TCP_RTO_MIN
 constexpr std::size_t min_queue_bytes = 2 * LinkShaper::segment_bytes;
 
-/// What stands before the first `mark`; `text` keeps what stands behind it.
+/// Returns the text before the first `mark`; `text` keeps the text after it.
 std::string_view take_until(std::string_view& text, char mark) {
   const std::size_t at = std::min(text.find(mark), text.size());
   const std::string_view part = text.substr(0, at);
@@ -35,7 +35,7 @@ RateStep parse_step(std::string_view source, std::string_view text) {
 void add_step(std::string_view source, RateSchedule& schedule, RateStep step) {
   const bool fits = schedule.empty() ? step.from_us == 0 : step.from_us > schedule.back().from_us;
   if (!fits) {
-    throw InputError(source, "", "rates have to begin at 0s and go on in time order",
+    throw InputError(source, "", "rates have to begin at 0s and be in time order",
                      "like rate=50mbit@0s,5mbit@10s");
   }
   schedule.push_back(step);
@@ -69,7 +69,7 @@ void set_value(std::string_view source, std::string_view key, std::string_view v
     link.burst = parse_burst(source, value);
   } else if (key == "congestion") {
     if (value != "cubic" && value != "none")
-      throw InputError(source, "", fmt::format("\"{}\" is no congestion control", value),
+      throw InputError(source, "", fmt::format("\"{}\" is not a congestion control", value),
                        "cubic or none");
     link.cubic = value == "cubic";
   } else {
@@ -86,7 +86,7 @@ LinkSettings parse_link(std::string_view source, std::string_view text) {
   std::string_view key;
   while (!text.empty()) {
     std::string_view value = take_until(text, ',');
-    // A part without a key goes on with the list of the one before.
+    // A part without a key continues the list of the one before.
     if (value.find('=') != std::string_view::npos) key = take_until(value, '=');
     set_value(fmt::format("{}: {}", source, key.empty() ? "?" : key), key, value, link);
   }

@@ -72,7 +72,7 @@ class LinkShaper {
     std::int64_t time_us = 0;
     std::size_t bytes = 0;
   };
-  /// What the sender comes to know.
+  /// The sender's knowledge.
   struct Notice {
     enum class Kind { acked, lost, timed_out } kind = Kind::acked;
     std::int64_t sent_us = 0;
@@ -84,7 +84,7 @@ class LinkShaper {
   /// Tells the window what the sender knows by now.
   void notice(std::int64_t now_us);
   [[nodiscard]] std::size_t buffer_room_bytes(std::int64_t now_us) const;
-  /// What the loss of a segment costs it; 0: it is not lost.
+  /// The delay by the loss of a segment; 0: it is not lost.
   std::int64_t recovery_us(std::int64_t queueing_us);
 
   LinkSettings link_;

@@ -72,7 +72,7 @@ LinkShaper shaper(std::string_view text) {
   return {link, link.down, 7};
 }
 
-TEST(LinkShaper, WithoutLimitsNothingIsLate) {
+TEST(LinkShaper, NothingIsLateWithoutLimits) {
   LinkShaper link = shaper("");
   EXPECT_EQ(link.send(1'000'000, 5), 5);
   EXPECT_EQ(link.room_bytes(5), SIZE_MAX);
@@ -138,7 +138,7 @@ TEST(LinkShaper, LosesTheShareThatItShould) {
   EXPECT_NEAR(late_share("delay=1ms,loss=2%,burst=5", 1'000'000), 0.02, 0.004);
 }
 
-TEST(LinkShaper, WhatFollowsALossWaitsForIt) {
+TEST(LinkShaper, DataBehindALossWaitsForIt) {
   LinkShaper link = shaper("delay=10ms,loss=50%,burst=1000");
   std::int64_t longest = 0;
   for (std::int64_t now = 0; now < 3'000'000; now += 1000) {
@@ -147,7 +147,7 @@ TEST(LinkShaper, WhatFollowsALossWaitsForIt) {
   EXPECT_EQ(longest, 10'000 + 20'000 + 200'000) << "delay, round trip, retransmission timeout";
 }
 
-/// What a sender that always has more gets through, and what becomes of its window.
+/// The throughput and window of a sender that always has more data.
 struct Transfer {
   explicit Transfer(std::string_view text) : settings(parse_link("", text)) {}
 
@@ -200,7 +200,7 @@ TEST(LinkShaper, ASenderFillsItsBottleneckAndLosesWhatIsBeyond) {
   EXPECT_LT(transfer.link.window().segments() * segment * 8.0, 20e6 * 0.150 * 1.1);
 }
 
-TEST(LinkShaper, WhoSendsLittleIsNotHeldBack) {
+TEST(LinkShaper, ASlowSenderIsNotHeldBack) {
   Transfer lossy("rate=20mbit,delay=25ms");
   for (std::int64_t now_us = 0; now_us < 10'000'000; now_us += 33'000) {
     ASSERT_GE(lossy.link.room_bytes(now_us), 5 * segment);

@@ -40,7 +40,7 @@ class TrajectoryMaker {
     for (const std::string& path : options.traces) {
       traces_.push_back(std::make_shared<const Trajectory>(read_camera_path(path).poses));
     }
-    // A wrong script is told now, not by each session.
+    // A wrong script fails now, not in each session.
     if (traces_.empty()) (void)make(0, SceneHints());
   }
 

@@ -14,7 +14,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
 #include "render_core/tools/json_report.h"
-#include "tests/load/html_report.h"
+#include "tests/load/chart_document.h"
 #include "tests/load/metrics.h"
 #include "tests/load/record.h"
 #include "tests/load/report.h"
@@ -64,7 +64,8 @@ void add_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--check-scene", options.scenario.check_scene,
                  "Compare decoded pictures with this scene, rendered here: a file or synth:…");
   app.add_option("--json", options.json, "Write the report here; - prints it instead");
-  app.add_option("--html", options.html, "Write a page with plots here");
+  app.add_option("--html", options.html,
+                 "Write a page with plots here (needs the built web client)");
   app.add_option("--require", options.requirements,
                  "METRIC OP NUMBER, repeatable: exit with 1 where it does not hold; METRIC@FROM-TO "
                  "is about a part of the run")
@@ -182,6 +183,7 @@ void write_file(const std::string& path, const std::string& text) {
 
 int run_checked(const ProgramOptions& options) {
   const Scenario scenario = scenario_of(options);
+  const std::string page = options.html.empty() ? "" : read_charts_page();
   const Outcome outcome =
       run_scenario(scenario, server_command(options.server), options.server_log);
   if (options.json != "-") fmt::print("{}", to_table(outcome.report, scenario.bounds));
@@ -192,7 +194,8 @@ int run_checked(const ProgramOptions& options) {
     json.update(to_json(outcome.report, outcome.metrics, scenario.bounds));
     write_json(options.json, json);
   }
-  if (!options.html.empty()) write_file(options.html, to_html(scenario, outcome));
+  if (!options.html.empty())
+    write_file(options.html, with_document(page, chart_document(scenario, outcome)));
   for (const Requirement& requirement : outcome.requirements) {
     const bool held = requirement.holds(outcome.metrics);
     fmt::print(stderr, "catgs-load: {}: {}\n", held ? "holds" : "requirement failed",

@@ -82,7 +82,7 @@ void add_pictures(const SessionReports& sessions, Metrics& metrics) {
   metrics.emplace_back("psnr_min_db", count > 0.0 ? min : none);
 }
 
-/// Of a rest, until a picture of the wanted size was there that shows what the scene does.
+/// Time from the start of a rest to a sharp picture of the wanted size.
 double sharp_after_ms(const SessionReport& session, int rest) {
   for (const PictureSample& sample : session.pictures)
     if (sample.rest == rest && sample.picture.size_px == session.still_size_px &&
@@ -210,10 +210,10 @@ double window_metric(const RunReport& report, std::string_view name) {
   const std::size_t at = std::min(name.find('@'), name.size());
   const std::string_view window = name.substr(std::min(at + 1, name.size()));
   const std::size_t dash = window.find('-');
-  if (dash == std::string_view::npos) refuse("is no part of the run", "like fps_mean@5s-10s");
+  if (dash == std::string_view::npos) refuse("is not a part of the run", "like fps_mean@5s-10s");
   const double from_s = parse_duration_s("--require", window.substr(0, dash));
   const double to_s = parse_duration_s("--require", window.substr(dash + 1));
-  if (!(from_s < to_s)) refuse("is no part of the run", "FROM-TO, in seconds of the run");
+  if (!(from_s < to_s)) refuse("is not a part of the run", "FROM-TO, in seconds of the run");
   const std::size_t dot = name.substr(0, at).rfind('.');
   const std::string_view group = dot == std::string_view::npos ? "" : name.substr(0, dot);
   const std::string_view metric =

@@ -31,8 +31,8 @@ Metrics collect_metrics(const RunReport& report, const HoldBounds& bounds);
 Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
                         const HoldBounds& bounds);
 
-/// What METRIC@FROM-TO means, like "good.pose_to_frame_p95_ms@12s-20s": the metric in a part of the
-/// run. Throws InputError where there is no such metric or group.
+/// METRIC@FROM-TO, like "good.pose_to_frame_p95_ms@12s-20s", is the metric in a part of the run.
+/// Throws InputError if there is no such metric or group.
 bool is_window_metric(std::string_view name);
 double window_metric(const RunReport& report, std::string_view name);
 

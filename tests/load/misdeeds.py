@@ -31,7 +31,7 @@ class Misdeed(NamedTuple):
     line: str = ""
     moves: tuple[str, ...] = ()
     resets: bool = False  # does not wait for an answer
-    reads: bool = True  # otherwise it has room for little, takes nothing and goes on to send bytes
+    reads: bool = True  # otherwise it has a small receive buffer, reads nothing and keeps sending
     closes: bool = False  # the same, but all that was sent arrives
     times: int = 1  # on one connection after the other
     drips: bool = False  # sends a byte more at each look

@@ -12,7 +12,7 @@ namespace catgs::load {
 
 inline constexpr const char* unnamed_group = "all";
 
-/// What a client asks the server for.
+/// A client's requests to the server.
 struct Wishes {
   std::string scene;  // empty: the server's first
   int fps = 60;

@@ -12,8 +12,8 @@ namespace catgs::load {
 /// that.
 void check_pictures(const std::string& scene, RunReport& report);
 
-/// What a video decoder's picture shows, RGB in [0, 1]: BT.709 limited range, or JFIF where it is
-/// full range. A chroma sample holds for its four pixels.
+/// Converts a decoder's picture to RGB in [0, 1]: from BT.709 limited range, or from JFIF if it is
+/// full range. A chroma sample serves its four pixels.
 std::vector<float> rgb_of(const DecodedPicture& picture);
 
 }  // namespace catgs::load

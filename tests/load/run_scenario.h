@@ -10,7 +10,7 @@
 
 namespace catgs::load {
 
-/// What came out of a run.
+/// The results of a run.
 struct Outcome {
   RunReport report;
   Metrics metrics;

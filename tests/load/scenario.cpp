@@ -20,7 +20,7 @@ InputError mistake(const std::string& path, const toml::node& node, std::string_
   return InputError(path, fmt::format("line {}", node.source().begin.line), what, remedy);
 }
 
-/// What stands in the file, as a command line has it.
+/// A value of the file, as on a command line.
 std::string text_of(const std::string& path, const toml::node& node) {
   if (const auto text = node.value_exact<std::string>()) return *text;
   if (const auto number = node.value_exact<std::int64_t>()) return std::to_string(*number);
@@ -72,7 +72,8 @@ std::vector<const toml::table*> tables_of(const std::string& path, const toml::t
   const toml::node* node = parent.get(key);
   if (node == nullptr) return {};
   if (const toml::table* table = node->as_table()) return {table};
-  if (!node->is_array_of_tables()) throw mistake(path, *node, fmt::format("{} is no table", key));
+  if (!node->is_array_of_tables())
+    throw mistake(path, *node, fmt::format("{} is not a table", key));
   std::vector<const toml::table*> tables;
   for (const toml::node& element : *node->as_array()) tables.push_back(element.as_table());
   return tables;

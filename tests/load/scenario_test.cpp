@@ -5,18 +5,19 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
-#include "tests/load/html_report.h"
+#include "tests/load/chart_document.h"
 #include "tests/load/picture_check.h"
-#include "tests/load/prometheus_text.h"
+#include "tests/load/server_metrics.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::load {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using ::testing::ThrowsMessage;
 
 class ScenarioFile : public ::testing::Test {
@@ -85,26 +86,21 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
   expect_refused("[[clients]]\nsessions = 0\n", "line 2: --sessions");
   expect_refused("[[clients]]\nlink = \"speed=1mbit\"\n", "line 2: --link");
   expect_refused("[[clients]]\nsizes = [[1]]\n", "line 2");
-  expect_refused("clients = 3\n", "line 1: clients is no table");
+  expect_refused("clients = 3\n", "line 1: clients is not a table");
   expect_refused("[[clients]]\n[[server.signals]]\nsignal = \"BOOM\"\n", "BOOM");
   expect_refused("[[clients]\n", "line 1");
 }
 
-TEST(PrometheusText, ChangesBetweenScrapesAreMeasured) {
-  const auto before = parse_prometheus(
-      "# HELP x y\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 100\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 100\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 100\n"
-      "catgs_stage_seconds_sum{stage=\"wait\"} 1\n"
-      "catgs_stage_seconds_count{stage=\"wait\"} 100\n"
-      "catgs_frames_total 7\ncatgs_sessions 3\n");
-  const auto after = parse_prometheus(
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.001\"} 150\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"0.01\"} 200\n"
-      "catgs_stage_seconds_bucket{stage=\"wait\",le=\"+Inf\"} 200\n"
-      "catgs_stage_seconds_sum{stage=\"wait\"} 1.5\n"
-      "catgs_frames_total 17\ncatgs_sessions 4\n");
+TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
+  const auto answer = [](int fast, int all, double sum_s, int frames, int sessions) {
+    return nlohmann::json{{"catgs_stage_seconds",
+                           {{{"labels", {{"stage", "wait"}}},
+                             {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
+                             {"sum", sum_s}}}},
+                          {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
+                          {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}}};
+  };
+  const auto before = answer(100, 100, 1.0, 7, 3), after = answer(150, 200, 1.5, 17, 4);
   const Metrics change = change_between(before, after, "server.");
   EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p50_ms"), 1.0);
   EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_p95_ms"), 1.0 + 9.0 * 45.0 / 50.0);
@@ -137,9 +133,9 @@ TEST(PictureCheck, ColoursOfBothRanges) {
   expect_pixel(grey(76, 85, 255, true), 1, 0, 0);  // JFIF red
 }
 
-TEST(HtmlReport, IsAPageOfItsOwnThatEscapesWhatItQuotes) {
+TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {
   Scenario scenario;
-  scenario.title = "<b>&\"";
+  scenario.title = "</script>";
   Outcome outcome;
   GroupReport& group = outcome.report.groups.emplace_back();
   group.name = "<i>";
@@ -155,13 +151,25 @@ TEST(HtmlReport, IsAPageOfItsOwnThatEscapesWhatItQuotes) {
   }
   outcome.metrics = collect_metrics(outcome.report, {});
   outcome.requirements.emplace_back("errors<1");
-  const std::string html = to_html(scenario, outcome);
-  EXPECT_THAT(html, HasSubstr("<h1>&lt;b&gt;&amp;&quot;</h1>"));
-  EXPECT_THAT(html, HasSubstr("errors&lt;1"));
-  EXPECT_THAT(html, HasSubstr("<path class=\"curve c0\" d=\"M"));
-  EXPECT_THAT(html, Not(HasSubstr("<i>")));
-  EXPECT_THAT(html, Not(HasSubstr("nan")));
-  EXPECT_THAT(html, Not(HasSubstr("://"))) << "nothing comes from elsewhere";
+  const auto document = chart_document(scenario, outcome);
+  const auto& parts = document.at("parts");
+  EXPECT_EQ(parts.at(0).at("table").at("rows").at(0).at(2), "holds");
+  EXPECT_EQ(parts.at(1).at("table").at("rows").at(0).at(0), "<i>");
+  const auto& plots = parts.at(2).at("plots");
+  EXPECT_EQ(plots.size(), 6u);
+  const auto& curves = plots.at(0).at("curves");
+  ASSERT_EQ(curves.size(), 2u) << "the group's and the bound";
+  EXPECT_NEAR(curves.at(0).at("y").at(0).get<double>(), 9.0, 0.1);
+  EXPECT_EQ(curves.at(1).at("y").at(0), 33.0);
+  const auto& shares = parts.at(3).at("plots").at(1).at("curves").at(0);
+  ASSERT_EQ(shares.at("x").size(), 1u);
+  EXPECT_NEAR(shares.at("x").at(0).get<double>(), 16.0, 0.2);
+  EXPECT_NEAR(shares.at("y").at(0).get<double>(), 99.9, 1e-9);
+
+  const std::string page = with_document("<a id=\"document\"></a>", document);
+  EXPECT_THAT(page, HasSubstr(R"(id="document">{"title":"<\/script>",)"));
+  EXPECT_THAT(page, EndsWith("]}]}</a>"));
+  EXPECT_THROW(with_document("<html></html>", document), InputError);
 }
 
 TEST(TimeSeries, StaysBoundedAndKeepsItsSums) {

@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "render_core/base/error.h"
+#include "tests/load/server_metrics.h"
 
 namespace catgs::load {
 namespace {
@@ -132,7 +133,7 @@ void ServerProcess::signal(int number) const {
   if (pid_ > 0) ::kill(pid_, number);
 }
 
-PrometheusSnapshot ServerProcess::scrape() const {
+nlohmann::json ServerProcess::server_metrics() const {
   namespace beast = boost::beast;
   namespace http = beast::http;
   try {
@@ -140,26 +141,26 @@ PrometheusSnapshot ServerProcess::scrape() const {
     beast::tcp_stream stream(io);
     stream.connect(
         {boost::asio::ip::address_v4::loopback(), static_cast<std::uint16_t>(admin_port_)});
-    http::request<http::empty_body> request(http::verb::get, "/metrics", 11);
+    http::request<http::empty_body> request(http::verb::get, "/api/metrics", 11);
     request.set(http::field::host, fmt::format("127.0.0.1:{}", admin_port_));
     http::write(stream, request);
     beast::flat_buffer buffer;
     http::response<http::string_body> response;
     http::read(stream, buffer, response);
-    return parse_prometheus(response.body());
+    return nlohmann::json::parse(response.body());
   } catch (const boost::system::system_error&) {
     return {};  // a server that a scenario has ended says nothing more
   }
 }
 
 void ServerProcess::begin_measuring() {
-  before_ = scrape();
+  before_ = server_metrics();
   sampler_ = std::jthread([this](const std::stop_token& stop) { sample(stop); });
 }
 
 void ServerProcess::end_measuring() {
   sampler_ = {};
-  after_ = scrape();
+  after_ = server_metrics();
 }
 
 void ServerProcess::sample(const std::stop_token& stop) {
@@ -221,8 +222,7 @@ Metrics ServerProcess::metrics() const {
                      {"server.rss_growth_mb", mean(0.75, 1.0, &UsageSample::server_rss_mb) -
                                                   mean(0.25, 0.5, &UsageSample::server_rss_mb)},
                      {"server.exit_code", exit_code_}};
-  for (auto& metric :
-       change_between(before_, after_.values.empty() ? before_ : after_, "server.")) {
+  for (auto& metric : change_between(before_, after_.empty() ? before_ : after_, "server.")) {
     metrics.push_back(std::move(metric));
   }
   return metrics;

@@ -6,14 +6,14 @@
 #include <thread>
 #include <vector>
 
+#include <nlohmann/json.hpp>
 #include <sys/types.h>
 
 #include "tests/load/metrics.h"
-#include "tests/load/prometheus_text.h"
 
 namespace catgs::load {
 
-/// What the machine did in a span, shares of all its cores.
+/// The load of the machine in a span, as shares of all its cores.
 struct UsageSample {
   double at_s = 0.0;  // since the first sample
   double server_cpu = 0.0, generator_cpu = 0.0, machine_cpu = 0.0;
@@ -37,15 +37,15 @@ class ServerProcess {
   void stop();
 
   /// "server.cpu_percent", "server.rss_growth_mb", "machine.others_cpu_percent", and the change of
-  /// everything under /metrics: "server.frame_stage_send_p99_ms", "server.frames_sent_total". NaN
-  /// before end_measuring().
+  /// everything under /api/metrics: "server.frame_stage_send_p99_ms", "server.frames_sent_total".
+  /// NaN before end_measuring().
   [[nodiscard]] Metrics metrics() const;
   [[nodiscard]] const std::vector<UsageSample>& usage() const { return usage_; }
 
  private:
   void wait_until_serving();
   void sample(const std::stop_token& stop);
-  [[nodiscard]] PrometheusSnapshot scrape() const;
+  [[nodiscard]] nlohmann::json server_metrics() const;
   [[nodiscard]] std::string log_text() const;
 
   std::filesystem::path log_;
@@ -55,7 +55,7 @@ class ServerProcess {
   int admin_port_ = 0;
   std::jthread sampler_;
   std::vector<UsageSample> usage_;
-  PrometheusSnapshot before_, after_;
+  nlohmann::json before_, after_;  // answers of /api/metrics
 };
 
 }  // namespace catgs::load

@@ -39,7 +39,7 @@ struct SessionSettings {
   std::int64_t run_begin_us = 0, start_us = 0, stop_us = 0;
 };
 
-/// What all sessions share; must outlive them.
+/// Shared by all sessions; must outlive them.
 struct SessionContext {
   boost::asio::ssl::context& tls;
   boost::asio::thread_pool& decoders;

@@ -10,7 +10,7 @@
 
 namespace catgs::load {
 
-/// What a client sees of a frame. Times in microseconds.
+/// A frame as a client sees it. Times are in microseconds.
 struct ReceivedFrame {
   std::uint64_t frame_id = 0;
   std::uint64_t pose_id = 0;

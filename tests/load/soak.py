@@ -7,14 +7,14 @@
 
 Rounds of scenarios/soak.toml, one after the other: visitors come and go, lose their sockets and
 resume, stand still; in each round one generator more is killed. Meanwhile strangers go round
-misdeeds.py and must be refused each time as is told there. Once a second the server's memory,
-descriptors and threads are read from /proc, every five seconds /metrics, and nvidia-smi where there
-is one. --out gets samples.jsonl, misdeeds.txt and soak.json.
+misdeeds.py and must be refused each time as stated there. Once a second the server's memory,
+descriptors and threads are read from /proc, every five seconds /api/metrics, and nvidia-smi where there
+is one. --out gets samples.jsonl, misdeeds.txt, soak.json, and soak.html with plots if the web client was built.
 
 Without --attach it starts the catgs-server beside the program, and stops it at the end; strangers then
 also save like an author who never ends. With it the server is one that runs already, on a loopback
-address and without tokens, and stays; a later run with the same --out and the same process goes on
-where the last one ended and judges both together.
+address and without tokens, and stays; a later run with the same --out and the same process continues
+the last one and judges both together.
 
 Flat: see soak_report.py. Errors: since the first of these runs the server's log must have no line of
 level warning or above but those that the strangers caused, and these as often as they did; the
@@ -76,17 +76,14 @@ def get(url: str) -> str:
 
 def parse_metrics(text: str) -> dict[str, float]:
     """Name to value; the values of a name's labels are summed."""
-    values: dict[str, float] = {}
-    for name, value in re.findall(r"^(\w+)(?:\{[^}]*\})? (\S+)$", text, re.MULTILINE):
-        values[name] = values.get(name, 0.0) + float(value)
-    return values
+    return {name: sum(one.get("value", 0.0) for one in series) for name, series in json.loads(text).items()}
 
 
 def looked_at(metrics: dict[str, float]) -> dict[str, float]:
     """Those that are sampled. A name that the server no longer has would otherwise stand still for ever."""
     names = (*GAUGES, *COUNTERS, *NEVER)
     if missing := [name for name in names if name not in metrics]:
-        raise Cannot(f"the server's /metrics lack {', '.join(missing)}")
+        raise Cannot(f"the server's /api/metrics lack {', '.join(missing)}")
     return {name: metrics[name] for name in names}
 
 
@@ -107,7 +104,7 @@ def device_mb() -> float | None:
 
 
 class Process:
-    """A running server, as /proc and /metrics show it."""
+    """A running server, as /proc and /api/metrics show it."""
 
     def __init__(self, pid: int, admin: str):
         self.folder = pathlib.Path("/proc") / str(pid)
@@ -142,11 +139,11 @@ class Process:
                 "descriptors": len(list((self.folder / "fd").iterdir())), "threads": field("Threads")}
 
     def metrics(self) -> dict[str, float]:
-        return looked_at(parse_metrics(get(self.admin + "/metrics")))
+        return looked_at(parse_metrics(get(self.admin + "/api/metrics")))
 
 
 class Sampler(threading.Thread):
-    """Writes samples of the process until it is told to stop or the process has ended."""
+    """Writes samples of the process until stop() or the end of the process."""
 
     def __init__(self, process: Process, path: pathlib.Path):
         super().__init__()
@@ -179,7 +176,7 @@ class Sampler(threading.Thread):
 
 def bad_lines(text: str, caused: collections.Counter[str]) -> list[str]:
     """Of a log in either format: level warning and above. `caused`: warnings that have to be there, and
-    how often; those that lack are told, too."""
+    how often; missing ones are reported, too."""
     bad = []
     left = caused.copy()
     for line in text.splitlines():
@@ -313,6 +310,16 @@ def read_samples(path: pathlib.Path) -> list[dict[str, float]]:
     return [json.loads(line) for line in path.read_text("utf-8").splitlines()[1:]]
 
 
+def write_page(arguments: argparse.Namespace, document: dict) -> None:
+    """Plots of the samples, if the web client was built."""
+    for folder in ("share/catgs/web", "web_client/dist"):
+        page = arguments.program.parent.parent / folder / "charts.html"
+        if page.exists():
+            text = json.dumps(document).replace("</", "<\\/")
+            html = page.read_text("utf-8").replace('id="document">', f'id="document">{text}', 1)
+            (arguments.out / "soak.html").write_text(html, "utf-8")
+
+
 def soak(arguments: argparse.Namespace) -> bool:
     arguments.out.mkdir(parents=True, exist_ok=True)
     server, link = None, ""
@@ -349,6 +356,7 @@ def soak(arguments: argparse.Namespace) -> bool:
     warm_up_s = None if arguments.warm_up is None else 60.0 * arguments.warm_up
     report = soak_report.judge(samples, warm_up_s) | {"rounds": rounds, "errors": errors, "misdeeds": strangers.done()}
     (arguments.out / "soak.json").write_text(json.dumps(report, indent=2) + "\n", "utf-8")
+    write_page(arguments, soak_report.chart_document(report, samples))
     print(soak_report.to_text(report))
     return report["flat"] and not errors
 

@@ -84,6 +84,18 @@ def judge(samples: list[Sample], warm_up_s: float | None = None) -> dict:
     return report
 
 
+def chart_document(report: dict, samples: list[Sample]) -> dict:
+    """For charts.html of the web client."""
+    def curve(name: str, points: Points) -> dict:
+        return {"name": name, "x": [at_s for at_s, _ in points], "y": [value for _, value in points]}
+
+    plots = [{"title": name, "unit": "", "curves": [curve(name, points_of(samples, name)),
+                                                    curve("lower envelope", quantity["envelope"])]}
+             for name, quantity in report["quantities"].items()]
+    return {"title": "Soak", "facts": to_text(report).splitlines()[0],
+            "parts": [{"heading": "Over time, in seconds", "plots": plots}]}
+
+
 def to_text(report: dict) -> str:
     lines = [f"{report.get('minutes', 0)} minutes, {report['rounds']} rounds: "
              f"{'flat' if report['flat'] else 'NOT FLAT'}, {len(report['errors'])} errors"]

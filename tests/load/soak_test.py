@@ -78,6 +78,13 @@ class Flatness(unittest.TestCase):
         self.assertTrue(soak_report.judge(first)["flat"], "too little to be seen in nine minutes")
         self.assertFalse(soak_report.judge(first + later)["flat"])
 
+    def test_the_page_has_each_quantity_and_its_envelope(self):
+        taken = samples(lambda s: 150.0)
+        report = soak_report.judge(taken) | {"rounds": 3, "errors": []}
+        plots = soak_report.chart_document(report, taken)["parts"][0]["plots"]
+        self.assertEqual([plot["title"] for plot in plots], ["rss_mb", "descriptors", "threads"])
+        self.assertEqual([len(curve["x"]) for curve in plots[0]["curves"]], [len(taken), soak_report.WINDOWS])
+
     def test_too_little_is_not_flat(self):
         self.assertFalse(soak_report.judge([])["flat"])
         self.assertFalse(self.judge(lambda s: 150.0, 0.3)["flat"])
@@ -113,7 +120,9 @@ class Findings(unittest.TestCase):
             self.assertEqual(of(1, [other]), [other, "1 lines too few: 127.0.0.1: refused"])
 
     def test_labels_of_a_metric_are_summed(self):
-        metrics = soak.parse_metrics('# HELP a b\na_total{by="x"} 1\na_total{by="y"} 2\nb 3.5e+01\n')
+        metrics = soak.parse_metrics(
+            '{"a_total": [{"labels": {"by": "x"}, "value": 1}, {"labels": {"by": "y"}, "value": 2}], '
+            '"b": [{"labels": {}, "value": 35}]}')
         self.assertEqual(metrics, {"a_total": 3.0, "b": 35.0})
 
     def test_a_metric_that_is_no_longer_there_does_not_stand_still(self):
@@ -143,7 +152,7 @@ class Findings(unittest.TestCase):
 
 
 class StandIn:
-    """A process whose metrics are told."""
+    """A process with given metrics."""
 
     def __init__(self, pid, value):
         self.folder, self.begin_s, self.value = pathlib.Path("/proc") / str(pid), 7.0, value

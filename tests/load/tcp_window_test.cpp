@@ -107,7 +107,7 @@ TEST(TcpWindow, RestartsAfterIdleTime) {
   EXPECT_TRUE(sender.window.slow_start()) << "it is soon back";
 }
 
-TEST(TcpWindow, WhatIsNotUsedDoesNotGrow) {
+TEST(TcpWindow, AnUnusedWindowDoesNotGrow) {
   Sender sender;
   for (int i = 0; i < 50; ++i) sender.round(4.0);
   EXPECT_EQ(sender.window.segments(), 10.0);

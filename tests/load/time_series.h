@@ -7,7 +7,7 @@
 
 namespace catgs::load {
 
-/// What a group of sessions saw in one span of the run.
+/// The measurements of a group of sessions in one span of the run.
 struct SeriesBin {
   std::uint64_t frames = 0;
   std::uint64_t bytes = 0;

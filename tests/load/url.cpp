@@ -1,8 +1,6 @@
 #include "tests/load/url.h"
 
-#include <algorithm>
-#include <regex>
-
+#include <boost/url/parse.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
@@ -15,24 +13,26 @@ std::string Url::authority() const {
 }
 
 Url parse_url(std::string_view text) {
-  static const std::regex form(
-      R"((wss?)://(\[[0-9A-Fa-f:.]+\]|[^:/?#@[\]]+)(?::([0-9]{1,5}))?(/[^?#@]*)?)");
-  std::cmatch parts;
+  const auto parsed = boost::urls::parse_uri(text);
+  const auto scheme = parsed ? parsed->scheme_id() : boost::urls::scheme::unknown;
+  const bool tls = scheme == boost::urls::scheme::wss;
   // A token in the address would end up in logs and in the shell's history.
-  if (!std::regex_match(text.data(), text.data() + text.size(), parts, form)) {
-    throw InputError("--url", "", fmt::format("\"{}\" is no address of a server", text),
+  if ((!tls && scheme != boost::urls::scheme::ws) || parsed->encoded_host().empty() ||
+      parsed->has_userinfo() || parsed->has_query() || parsed->has_fragment()) {
+    throw InputError("--url", "", fmt::format("\"{}\" is not an address of a server", text),
                      "like ws://127.0.0.1:8080 or wss://example.org; tokens go to --token");
   }
-  Url url;
-  url.tls = parts[1] == "wss";
-  url.host = parts[2];
-  std::erase_if(url.host, [](char c) { return c == '[' || c == ']'; });
-  url.port = parts[3].matched ? parts[3].str() : url.tls ? "443" : "80";
-  if (const int port = std::stoi(url.port); port < 1 || port > 65535) {
-    throw InputError("--url", "", fmt::format("port {} is no number of 1 to 65535", url.port));
+  if (parsed->has_port() && parsed->port_number() == 0) {
+    throw InputError(
+        "--url", "",
+        fmt::format("port {} is not a number from 1 to 65535", std::string(parsed->port())));
   }
-  if (parts[4].matched) url.path = parts[4];
-  return url;
+  return {.tls = tls,
+          .host = parsed->host_address(),
+          .port = parsed->has_port() ? std::string(parsed->port())
+                  : tls              ? "443"
+                                     : "80",
+          .path = parsed->encoded_path().empty() ? "/" : std::string(parsed->encoded_path())};
 }
 
 }  // namespace catgs::load

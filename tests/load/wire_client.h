@@ -21,7 +21,7 @@ struct FrameMessage {
   std::span<const std::byte> bitstream;  // inside the parsed bytes
 };
 
-/// What is wrong with a message from the server.
+/// A fault of a message from the server.
 struct WireError {
   std::string what;
 };

@@ -62,7 +62,7 @@ HttpReply http_get(int port, const std::string& target,
 HttpReply http_put(int port, const std::string& target, const std::string& body,
                    const std::map<std::string, std::string>& headers = {});
 
-/// Of a gauge or counter without labels.
+/// The value of a gauge or counter without labels.
 double metric(const RunningServer& server, const std::string& name);
 
 /// Whether the condition comes true. Twenty seconds are a bound against hanging, no measurement.

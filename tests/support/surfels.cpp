@@ -12,11 +12,11 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 
+#include "render_core/math/constants.h"
+
 namespace catgs::test {
 
 namespace {
-
-constexpr double sh_constant = 0.28209479177387814;
 
 /// A disc in camera space.
 struct Disc {
@@ -54,7 +54,7 @@ std::vector<Disc> discs_of(const GaussianCloud& cloud, const Camera& camera) {
     disc.normal = axes[2];
     disc.centre_px = glm::dvec2(disc.centre) / disc.centre.z * glm::dvec2(camera.focal_px) +
                      glm::dvec2(camera.principal_point_px);
-    disc.colour = glm::max(0.5 + sh_constant * glm::dvec3(cloud.sh[i]), 0.0);
+    disc.colour = glm::max(0.5 + sh_basis_0 * glm::dvec3(cloud.sh[i]), 0.0);
     disc.opacity = cloud.opacity[i];
     discs.push_back(disc);
   }

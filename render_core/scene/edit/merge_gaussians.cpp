@@ -31,7 +31,7 @@ constexpr std::size_t block = 4096;     // of Gaussians, a thread's piece of wor
 constexpr double least_weight = 1e-30;  // a needle or a point has no area, but still a place
 
 /// A Gaussian as the cost sees it. The unit of length is the mean size in the scene.
-struct Splat {
+struct MergedSplat {
   glm::vec3 mean{0.0f};
   Covariance<float> shape;
   float opacity = 0.0f, weight = 0.0f, size = 0.0f;
@@ -57,7 +57,7 @@ float flat_product(const Flat& a, const Flat& b, float x, float y) {
 
 /// Integral of the product of two Gaussians with their opacities, mean of the views along the three
 /// axes, but for a factor of pi.
-float product(const Splat& a, const Splat& b) {
+float product(const MergedSplat& a, const MergedSplat& b) {
   const Covariance<float>&p = a.shape, &q = b.shape;
   const glm::vec3 d = a.mean - b.mean;
   const float sum = flat_product({p.xx, p.xy, p.yy}, {q.xx, q.xy, q.yy}, d.x, d.y) +
@@ -71,10 +71,10 @@ float opacity_of(double weight, double area) {
                     static_cast<float>(alpha_min), max_opacity);
 }
 
-Splat joined(const Splat& a, const Splat& b) {
+MergedSplat joined(const MergedSplat& a, const MergedSplat& b) {
   const float weight = a.weight + b.weight, share = b.weight / weight;
   const glm::vec3 d = b.mean - a.mean;
-  Splat m;
+  MergedSplat m;
   m.mean = a.mean + share * d;
   m.shape.add(1.0f - share, a.shape);
   m.shape.add(share, b.shape);
@@ -85,12 +85,14 @@ Splat joined(const Splat& a, const Splat& b) {
 }
 
 /// The error E of a pair, but for a factor of pi.
-float error_of(const Splat& a, const Splat& b) {
-  const Splat m = joined(a, b);
-  const auto likeness = [](const Splat& i, const Splat& j) {
+float error_of(const MergedSplat& a, const MergedSplat& b) {
+  const MergedSplat m = joined(a, b);
+  const auto likeness = [](const MergedSplat& i, const MergedSplat& j) {
     return static_cast<double>(glm::dot(i.colour, j.colour) + ground_squared);
   };
-  const auto cross = [&](const Splat& i, const Splat& j) { return likeness(i, j) * product(i, j); };
+  const auto cross = [&](const MergedSplat& i, const MergedSplat& j) {
+    return likeness(i, j) * product(i, j);
+  };
   const double error = likeness(a, a) * a.power + likeness(b, b) * b.power + cross(m, m) +
                        2.0 * (cross(a, b) - cross(a, m) - cross(b, m));
   // A value that is no number counts as the largest one, so that every pair can be joined at last.
@@ -100,7 +102,7 @@ float error_of(const Splat& a, const Splat& b) {
 }
 
 /// The cost of merge_nodes.h, relative to the sizes of the two.
-float cost_of(const Splat& a, const Splat& b) {
+float cost_of(const MergedSplat& a, const MergedSplat& b) {
   const glm::vec3 d = b.mean - a.mean, colours = b.colour - a.colour;
   const float larger = b.size - a.size;
   const float square = 0.5f * (a.size * a.size + b.size * b.size) + 1e-30f;
@@ -138,7 +140,7 @@ class Round {
   GaussianCloud& cloud_;
   ThreadPool& pool_;
   std::vector<std::uint32_t> order_;  // along the curve
-  std::vector<Splat> splats_;         // in that order
+  std::vector<MergedSplat> splats_;   // in that order
 };
 
 Round::Round(GaussianCloud& cloud, ThreadPool& pool)
@@ -156,7 +158,7 @@ Round::Round(GaussianCloud& cloud, ThreadPool& pool)
     const glm::quat& q = cloud_.rotation[i];
     const float rotation[4] = {q.x, q.y, q.z, q.w};
     const glm::vec3 scale(glm::dvec3(cloud_.scale[i]) / unit);
-    Splat& splat = splats_[place];
+    MergedSplat& splat = splats_[place];
     splat.mean = glm::vec3((glm::dvec3(cloud_.mean[i]) - middle) / unit);
     splat.shape =
         covariance_of(math::covariance_factor<float>(rotation, {scale.x, scale.y, scale.z}));
@@ -169,7 +171,7 @@ Round::Round(GaussianCloud& cloud, ThreadPool& pool)
 }
 
 Partner Round::partner_of(std::size_t place) const {
-  const Splat& splat = splats_[place];
+  const MergedSplat& splat = splats_[place];
   std::array<std::pair<float, std::uint32_t>, compared> best;
   best.fill({std::numeric_limits<float>::infinity(), 0});
   const std::size_t end = std::min(splats_.size(), place + 1 + next_on_curve);

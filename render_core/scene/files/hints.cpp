@@ -25,7 +25,7 @@ constexpr std::size_t max_about_bytes = 800;  // of one text: 200 characters or 
 glm::vec3 parse_up(const JsonField& field) {
   if (field.value().is_string()) {
     const std::optional<glm::vec3> up = axis_named(field.text());
-    if (!up) field.fail("is no axis", "write \"-y\", \"+z\", … or [x, y, z]");
+    if (!up) field.fail("is not an axis", "write \"-y\", \"+z\", … or [x, y, z]");
     return *up;
   }
   const glm::dvec3 up = field.vec3();  // squares of large floats overflow a float
@@ -68,7 +68,7 @@ std::string parse_line(const std::optional<JsonField>& field) {
 CameraMode parse_mode(const JsonField& field) {
   const auto found = std::ranges::find(mode_names, field.text());
   if (found == mode_names.end())
-    field.fail("is no mode", fmt::format("write {}", fmt::join(mode_names, ", ")));
+    field.fail("is not a mode", fmt::format("write {}", fmt::join(mode_names, ", ")));
   return static_cast<CameraMode>(1 + (found - mode_names.begin()));
 }
 
@@ -76,7 +76,7 @@ std::uint32_t parse_colour(const JsonField& field) {
   const std::string text = field.text();
   const auto rgb =
       text.starts_with('#') ? parse_rgb(std::string_view(text).substr(1)) : std::nullopt;
-  if (!rgb) field.fail("is no colour", "write \"#rrggbb\" in hexadecimal digits");
+  if (!rgb) field.fail("is not a colour", "write \"#rrggbb\" in hexadecimal digits");
   return *rgb;
 }
 
@@ -120,7 +120,7 @@ Sidecar read_sidecar(const ByteSource& file) {
   if (const auto model = root.find("model")) {
     sidecar.model = splat_model_named(model->text());
     if (!sidecar.model)
-      model->fail("is no model", fmt::format("write {}", fmt::join(splat_model_names, ", ")));
+      model->fail("is not a model", fmt::format("write {}", fmt::join(splat_model_names, ", ")));
   }
   return sidecar;
 }

@@ -64,7 +64,7 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
 
 SceneInPages open_in_pages(const SceneLocation& location, const LoadOptions& options) {
   if (!location.is_in_pages())
-    throw InputError(location.given.string(), "", "is no tree, so it has no detail to choose",
+    throw InputError(location.given.string(), "", "is not a tree, so it has no detail to choose",
                      "make one with catgs-render convert IN OUT.tree");
   return open_in_pages(location.files.path, location, options);
 }

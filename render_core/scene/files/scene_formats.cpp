@@ -43,7 +43,7 @@ const SceneFormat& format_of(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   for (const SceneFormat* format : formats)
     if (format->is_mine && format->is_mine(file, extension)) return *format;
-  throw InputError(path.string(), "", "is no scene of a known format", supported_scenes());
+  throw InputError(path.string(), "", "is not a scene of a known format", supported_scenes());
 }
 
 const SceneFormat* format_with(std::string_view extension) {

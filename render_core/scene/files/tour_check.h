@@ -21,11 +21,11 @@ inline constexpr std::size_t max_portal_bytes = 128;  // of the id of a scene th
 /// `media_origins`; null: at any site. Throws InputError that names the field.
 void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins);
 
-/// How people are told of a mistake that check_tours() finds in a file.
+/// Begins the warning about a mistake that check_tours() finds in a file.
 inline constexpr std::string_view faulty_tours = "pages may not show all of these tours: ";
 
-/// Checks the tours of a scene, with media at any site. Returns what people are told of the first
-/// mistake; nothing where there is none.
+/// Checks the tours of a scene, with media at any site. Returns the warning about the first
+/// mistake; nothing if there is none.
 std::optional<std::string> mistake_in_tours(const HintFiles& files);
 
 }  // namespace catgs

@@ -21,7 +21,7 @@ glm::quat orientation_of(const JsonField& field, const glm::mat3& rotation) {
   bool is_rotation = std::abs(glm::determinant(rotation) - 1.0f) < 0.05f;
   for (int c = 0; c < 3; ++c)
     is_rotation = is_rotation && std::abs(glm::length(rotation[c]) - 1.0f) < 0.05f;
-  if (!is_rotation) field.fail("is no rotation");
+  if (!is_rotation) field.fail("is not a rotation");
   return glm::normalize(glm::quat_cast(rotation));
 }
 
@@ -135,7 +135,7 @@ CameraList read_transforms(const JsonField& file) {
 
 CameraList read_path(const JsonField& file) {
   if (const auto type = file.find("camera_type"); type && type->text() != "perspective")
-    type->fail("is no perspective camera", "this renderer draws perspective pictures only");
+    type->fail("is not a perspective camera", "this renderer draws perspective pictures only");
   const auto number = [&](std::string_view key) { return positive(file, file, key); };
   const glm::vec2 size_px{number("render_width"), number("render_height")};
   CameraList list;
@@ -164,7 +164,7 @@ CameraList read_camera_json(const ByteSource& file) {
   if (document.is_array()) return read_array(root);
   if (root.find("camera_path")) return read_path(root);
   if (root.find("tours"))
-    root.fail("is a sidecar, whose tours are no camera path",
+    root.fail("is a sidecar, whose tours are not a camera path",
               "with ?author, the page saves the camera path of a tour as a .tum file");
   if (!root.find("frames"))
     root.fail("lists no cameras",

@@ -89,7 +89,7 @@ class GzipStream final : public ByteStream {
     else if (result == Z_MEM_ERROR)
       throw std::bad_alloc();
     else if (result != Z_OK)
-      fail(fmt::format("bad gzip data: {}", stream_.msg ? stream_.msg : "cannot go on"));
+      fail(fmt::format("bad gzip data: {}", stream_.msg ? stream_.msg : "cannot be continued"));
   }
 
   Input input_;

@@ -55,7 +55,7 @@ GltfComponent component_of(const JsonField& field) {
        {GltfComponent::byte, GltfComponent::unsigned_byte, GltfComponent::short_int,
         GltfComponent::unsigned_short, GltfComponent::float32})
     if (field.count() == static_cast<std::uint64_t>(known)) return known;
-  field.fail("is no component type of an attribute");
+  field.fail("is not a component type of an attribute");
 }
 
 std::size_t columns_of(const JsonField& field) {
@@ -98,7 +98,7 @@ std::vector<std::byte> decode_base64(const JsonField& uri, std::string_view text
   int held = 0;
   for (const char c : text) {
     const std::uint32_t value = values[static_cast<unsigned char>(c)];
-    if (value == 64) uri.fail("is no base64 data");
+    if (value == 64) uri.fail("is not base64 data");
     bits = bits << 6 | value;
     held += 6;
     if (held < 8) continue;

@@ -153,7 +153,7 @@ glm::vec3 JsonField::place() const { return as_place(vec3()); }
 glm::vec3 JsonField::as_place(const glm::vec3& at) const {
   for (int k = 0; k < 3; ++k)
     if (!(std::abs(at[k]) <= max_coordinate))
-      fail(fmt::format("is no place in a scene: beyond {} units", max_coordinate));
+      fail(fmt::format("is not a position in a scene: beyond {} units", max_coordinate));
   return at;
 }
 

@@ -169,7 +169,7 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   return header;
 }
 
-/// What the extension records say.
+/// The contents of the extension records.
 struct Extensions {
   std::uint32_t system = right_up_back_system;
   std::optional<OrbitLimits> orbit;

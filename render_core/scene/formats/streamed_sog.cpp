@@ -39,7 +39,7 @@ std::vector<std::optional<LodPiece>> parse_node(const JsonField& lods, const Lod
     std::size_t level = 0;
     const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), level);
     if (error != std::errc{} || end != key.data() + key.size() || level >= pieces.size())
-      lods.fail(fmt::format("'{}' is no level in 0…{}", key, tree.levels - 1));
+      lods.fail(fmt::format("'{}' is not a level in 0…{}", key, tree.levels - 1));
     pieces[level] = parse_piece(lods.at(key), tree.files.size());
   }
   return pieces;

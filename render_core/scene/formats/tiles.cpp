@@ -44,7 +44,7 @@ struct Content {
   GltfSize size;
 };
 
-/// What a tile takes over from the one above it.
+/// The values that a tile inherits from its parent.
 struct Above {
   std::optional<std::size_t> node{};
   AffineMap map{};

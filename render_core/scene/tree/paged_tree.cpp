@@ -87,7 +87,7 @@ std::span<const PagedTree::Seen> PagedTree::look() {
     if (number == 0) continue;  // it has not looked yet
     Cut cut =
         table_->cut(lookout.cameras, lookout.detail_px, std::numeric_limits<double>::infinity());
-    // What cannot be read is not on its way, and no memory is short of it.
+    // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
       return broken_.contains(shape().family_of(use.page));
     });

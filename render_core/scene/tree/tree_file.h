@@ -60,7 +60,7 @@ class TreeFile {
   [[nodiscard]] const std::string& name() const { return file_->name(); }
   [[nodiscard]] const TreeHeader& header() const { return header_; }
   [[nodiscard]] const TreeShape& shape() const { return shape_; }
-  /// That of the header, or the one that set_model() has put in its place.
+  /// The header's model, or the one given to set_model().
   [[nodiscard]] SplatModel model() const { return header_.model; }
   /// Call before others use the tree.
   void set_model(SplatModel model) { header_.model = model; }

@@ -42,11 +42,11 @@ class Watch {
   /// Whether the next frame for the same lookout may look better than one at `now_s`, in the pool's
   /// time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
-  /// Number of turns in which changes of its cuts have begun or gone on.
+  /// Number of turns that began or continued a change of its cuts.
   [[nodiscard]] std::uint64_t changes() const;
-  /// Number of pages that were missing of late: they are being read, or find no room.
+  /// Number of pages that were wanted but not resident at the pool's last update.
   [[nodiscard]] std::uint32_t missing() const;
-  /// The largest error that is drawn for want of them, px.
+  /// The largest error caused by missing pages, px.
   [[nodiscard]] float coarsest_px() const;
 
  private:

@@ -115,7 +115,7 @@ PaperTable ablation_table(PaperCase& scene) {
       table.notes.push_back(scene.label() + ": no tile was split.");
     }
   }
-  table.notes.push_back("As `bench` is told: " + flags + ".");
+  table.notes.push_back("Flags of `bench`: " + flags + ".");
   table.notes.emplace_back(
       "Flatness: p99 over frames of their time over the median of the 121 around, "
       "of the worst trace.");

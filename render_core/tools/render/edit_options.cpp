@@ -91,7 +91,7 @@ void add_edit_options(CLI::App& command, EditOptions& options) {
 SceneEdit edit_of(const EditOptions& options) {
   SceneEdit edit;
   if (!(options.scale >= 1.0 / largest_scale && options.scale <= largest_scale))
-    throw InputError("--scale", "", fmt::format("{} is no scale", options.scale),
+    throw InputError("--scale", "", fmt::format("{} is not a scale", options.scale),
                      fmt::format("{} to {}", 1.0 / largest_scale, largest_scale));
   edit.placement.scale = options.scale;
   if (options.rotate) edit.placement.rotation = parse_rotation(*options.rotate);

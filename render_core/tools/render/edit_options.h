@@ -21,7 +21,7 @@ void add_edit_options(CLI::App& command, EditOptions& options);
 /// Throws InputError that names the option.
 SceneEdit edit_of(const EditOptions& options);
 
-/// What the edit has done, a line each, for people.
+/// Prints the effects of an edit, one per line.
 void print_counts(const EditCounts& counts);
 
 }  // namespace catgs

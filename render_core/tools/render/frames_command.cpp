@@ -38,7 +38,7 @@ glm::vec3 parse_colour(std::string_view flag, std::string_view text) {
   if (text == "white") return glm::vec3(1.0f);
   const auto rgb = parse_rgb(text.substr(text.starts_with('#') ? 1 : 0));
   if (!rgb)
-    throw InputError(flag, "", fmt::format("\"{}\" is no colour", text),
+    throw InputError(flag, "", fmt::format("\"{}\" is not a colour", text),
                      "white, black or six hexadecimal digits like ff8000");
   return colour_of(*rgb);
 }

@@ -197,7 +197,6 @@ void add_trace_command(CLI::App& app) {
   add_motion(*trace, {"rotate", "On the spot", MotionKind::rotate, 30.0});
   add_script(*trace);
   add_check(*trace);
-  add_trace_forecast_command(*trace);
   add_trace_windows_command(*trace);
 }
 

@@ -70,7 +70,7 @@ void parse_sidecar(Bytes input) {
   if (sidecar.focus) require(is_place(*sidecar.focus), "the focus is a place");
   const SceneAbout& about = sidecar.about;
   for (const std::string& text : {about.title, about.credits, about.licence})
-    require(printable(text) == text, "what visitors are told is printable");
+    require(printable(text) == text, "texts for visitors are printable");
   require(about.background_rgb <= 0xffffff, "the background is a colour");
   if (sidecar.start_pose)
     require_sound(Pose{sidecar.start_pose->position, sidecar.start_pose->orientation});

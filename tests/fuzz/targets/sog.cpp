@@ -20,7 +20,7 @@
 namespace catgs::fuzz {
 namespace {
 
-/// Of a few colours: with 252 to 255, which are tags of rotations in the fourth channel.
+/// An image of a few colours. Values 252 to 255 are tags of rotations in the fourth channel.
 std::string any_image(const Material& from) {
   constexpr std::array<int, 9> widths = {1, 2, 3, 4, 16, 64, 192, 512, 960};
   constexpr std::array<int, 6> heights = {1, 2, 4, 64, 1024, 1025};

@@ -3,10 +3,10 @@
 #include <cstring>
 
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walker.h"
 #include "tests/fuzz/target.h"
 #include "tests/render_core/walk/hand_made_map.h"
 #include "tests/render_core/walk/seal.h"
+#include "tests/support/walker.h"
 
 namespace catgs::fuzz {
 namespace {

@@ -65,7 +65,7 @@ TEST(DeviceSet, PlacesGoWhereTheLeastWorkIsMeasured) {
   EXPECT_EQ(take(), 1) << "nobody works: the fewest, in turn";
 }
 
-TEST(DeviceSet, WhatNobodyMeasuredIsForgottenWithItsView) {
+TEST(DeviceSet, UnmeasuredCostsAreForgottenWithTheirView) {
   const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
   const std::vector<int> devices = {0, 1};
   const auto a = set->take(devices);

@@ -52,7 +52,7 @@ TEST(Printable, FormatCharactersComeOutByTheirBytes) {
     EXPECT_EQ(printable(beside), beside);
 }
 
-TEST(Printable, WhatIsNotUtf8ComesOutByItsBytes) {
+TEST(Printable, InvalidUtf8IsPrintedByteByByte) {
   for (const auto& [text, wanted] : {
            std::pair{"\x9b", R"(\x9b)"},
            {"\xff", R"(\xff)"},
@@ -79,7 +79,7 @@ TEST(Shortened, EndsWithAWholeCharacterWhereThereAreSome) {
   EXPECT_EQ(shortened("abc", 0), "");
 }
 
-TEST(Printable, WhatWentThroughItStays) {
+TEST(Printable, IsIdempotent) {
   std::string bytes;
   for (int first = 0; first < 256; ++first)
     for (int second = 0; second < 256; ++second)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the general categories of all characters, as Python's unicodedata has them, as a C++ header.
 
-Unassigned characters are told apart: a later Unicode may make them anything.
+Unassigned characters have a category of their own: a later Unicode may assign them to any.
 """
 
 import itertools

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <ranges>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/cpu/kernels.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/motion/anchor.h"
 #include "render_core/motion/script.h"
@@ -131,7 +133,7 @@ TEST(CatgsView, EachInstructionSetAndAnyNumberOfThreadsDrawTheSame) {
   const std::vector<Rendered> threaded = pictures(5, "auto");
   for (std::size_t k = 0; k < expected.size(); ++k)
     EXPECT_EQ(threaded[k].rgb, expected[k].rgb) << k;
-  for (const std::string_view simd : simd_targets()) {
+  for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name)) {
     const std::vector<Rendered> other = pictures(2, std::string(simd));
     for (std::size_t k = 0; k < expected.size(); ++k)
       EXPECT_GE(test::psnr_db(other[k].rgb, expected[k].rgb), 60.0) << simd << " " << k;

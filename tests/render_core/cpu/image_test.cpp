@@ -2,12 +2,14 @@
 
 #include <cstdlib>
 #include <limits>
+#include <ranges>
 #include <thread>
 
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
+#include "render_core/cpu/kernels.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/frame/renderer.h"
 #include "tests/support/test_scenes.h"
@@ -38,7 +40,7 @@ class SmallScenes : public testing::TestWithParam<TestScene> {};
 
 TEST_P(SmallScenes, ExactMatchesReference) {
   const auto reference = render(GetParam(), {RendererKind::reference, pool_of(2), "auto"});
-  for (const std::string_view simd : simd_targets()) {
+  for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name)) {
     const auto exact = render(GetParam(), {RendererKind::cpu, pool_of(2), std::string(simd)});
     EXPECT_GE(test::psnr_db(exact.rgb, reference.rgb), 60.0) << simd;
     EXPECT_EQ(exact.stats.overflowed_entries, 0u);
@@ -128,7 +130,7 @@ TEST(I420, BackgroundPatchesHaveTheCodesOfBt709) {
       {{0, 0, 1}, 32, 240, 118},           {{1, 1, 0}, 219, 16, 138},
       {{0.5f, 0.5f, 0.5f}, 126, 128, 128}, {{0.75f, 0, 0.75f}, 63, 193, 204},
   };
-  for (const std::string_view simd : simd_targets()) {
+  for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name)) {
     const auto renderer = make_renderer(std::make_shared<const GaussianCloud>(),
                                         {RendererKind::cpu, pool_of(2), std::string(simd)})
                               .renderer;
@@ -153,7 +155,7 @@ TEST(I420, MatchesReferenceWithinOneCode) {
     if (size.x % 2 != 0 || size.y % 2 != 0) continue;
     std::vector<std::vector<std::uint8_t>> images;
     std::vector<RendererOptions> cores = {{RendererKind::reference, pool_of(2), "auto"}};
-    for (const std::string_view simd : simd_targets())
+    for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name))
       cores.push_back({RendererKind::cpu, pool_of(2), std::string(simd)});
     for (const RendererOptions& core : cores) {
       const auto renderer = make_renderer(scene.cloud, core).renderer;
@@ -203,7 +205,7 @@ TEST(CpuView, FramesDoNotDependOnTheOnesBefore) {
 TEST(CpuView, CountsThePairsOfTheReference) {
   for (const TestScene& scene : test::small_scenes()) {
     const auto reference = render(scene, {RendererKind::reference, pool_of(2), "auto"});
-    for (const std::string_view simd : simd_targets()) {
+    for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name)) {
       const auto exact =
           render(scene, {RendererKind::cpu, pool_of(2), std::string(simd)}, {.count_pairs = true});
       // The reference counts what it blends or skips in front of saturation; rounding moves rims.
@@ -299,7 +301,7 @@ TEST(MakeRenderer, SaysWhatItChoseAndWhy) {
   EXPECT_FALSE(make_renderer(cloud, {RendererKind::automatic, pool_of(2), "auto"}).reason.empty());
   const MadeRenderer made = make_renderer(cloud, {RendererKind::cpu, pool_of(2), "auto"});
   EXPECT_EQ(made.renderer->description(),
-            "CPU, " + std::string(simd_targets().front()) + ", 2 threads");
+            "CPU, " + std::string(simd_kernels().front().name) + ", 2 threads");
   EXPECT_FALSE(made.reason.empty());
   EXPECT_GT(made.renderer->scene_bytes(), 0u);
 

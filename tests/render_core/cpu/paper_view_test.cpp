@@ -1,5 +1,6 @@
 // Pipeline::paper in the CPU core against its exact pipeline at the same poses.
 
+#include <ranges>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/thread_pool.h"
+#include "render_core/cpu/kernels.h"
 #include "render_core/cpu/scene_store.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/motion/frame_groups.h"
@@ -40,7 +42,7 @@ class PaperViews : public testing::TestWithParam<TestScene> {
 // the near plane or into the image among it. Order is another matter: a turn makes it wrong.
 TEST_P(PaperViews, OnTheForecastPathNothingIsMissing) {
   const TestScene& scene = GetParam();
-  for (const std::string_view simd : simd_targets()) {
+  for (const std::string_view simd : std::views::transform(simd_kernels(), &SimdKernels::name)) {
     const auto core = renderer(2, std::string(simd));
     const auto exact = core->make_view({});
     for (const Move& move : moves()) {
@@ -142,7 +144,7 @@ TEST(PaperView, KeyOrderIsWrongOnceTheViewTurned) {
   EXPECT_LT(psnr, 60.0);
 }
 
-TEST(PaperView, WithoutForecastIsTheExactPipeline) {
+TEST(PaperView, NoForecastGivesTheExactPipeline) {
   const TestScene scene = test::small_scenes().front();
   const auto renderer = cpu_renderer_of(scene);
   const auto view = renderer->make_view({.pipeline = Pipeline::paper});

@@ -103,7 +103,7 @@ TEST(FrameRoom, ListsFollowFromSplatsOnlyIfMostWereCounted) {
   EXPECT_GE(most.sizes().list_entries, 4'000'000u);
 }
 
-TEST(FrameRoom, OfAnEmptySceneOrWithoutSlices) {
+TEST(FrameRoom, AnEmptySceneAndNoSlicesAreHandled) {
   FrameRoom empty(0, 0, false);
   for (int i = 0; i < 3 * patience; ++i) ASSERT_FALSE(empty.outgrown_by({}));
   EXPECT_GE(empty.sizes().visible, 1u);

@@ -31,7 +31,7 @@ TEST(CudaMemory, BoundedListsKeepTheNearestAndCountTheRest) {
   EXPECT_GT(test::psnr_db(cut.rgb, whole.rgb), 15.0);
 }
 
-// Lists that find no memory are cut, counted, and grow no more; frames go on.
+// Lists that find no memory are cut, counted, and grow no more; frames continue.
 TEST(CudaMemory, ListsThatTheDeviceCannotHoldAreCut) {
   REQUIRE_DEVICE();
   const TestScene scene = random_scene(400'000);

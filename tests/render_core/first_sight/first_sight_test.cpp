@@ -62,7 +62,7 @@ TEST(FirstSight, TheSideWithMostDetailIsTheFront) {
 }
 
 /// A statue on wide ground, high above the bounds of most Gaussians.
-TEST(FirstSight, WhatStandsHighAboveTheGroundIsInThePicture) {
+TEST(FirstSight, TallThingsAreInThePicture) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> uniform(-1.0f, 1.0f);
   std::size_t i = 0;

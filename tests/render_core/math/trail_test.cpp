@@ -219,7 +219,7 @@ TEST(Trail, CoversEveryPixelOfEveryStepOfThePath) {
   EXPECT_GT(touched, 300);
 }
 
-TEST(Trail, OfNoLengthIsItsEllipse) {
+TEST(Trail, ATrailOfZeroLengthIsItsEllipse) {
   RandomCases random;
   for (int n = 0; n < 10000; ++n) {
     Case c = random.next();

@@ -74,7 +74,7 @@ double slow_ssim(const Image& a, const Image& b) {
   return total / windows;
 }
 
-TEST(ImageQuality, OfIdenticalPicturesIsPerfect) {
+TEST(ImageQuality, IdenticalPicturesArePerfect) {
   const Image image = noise(40, 30, 1);
   const ImageQuality quality = compare_images(image, image);
   EXPECT_TRUE(std::isinf(quality.psnr()));

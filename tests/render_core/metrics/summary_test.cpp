@@ -19,7 +19,7 @@ TEST(Summary, UsesNearestRanks) {
   EXPECT_EQ(summary.max, 100.0);
 }
 
-TEST(Summary, OfOneValueAndOfNone) {
+TEST(Summary, OneValueAndNoneAreSummarised) {
   const Summary one = summarize({3.0});
   EXPECT_EQ(one.p50, 3.0);
   EXPECT_EQ(one.p99, 3.0);
@@ -39,7 +39,7 @@ TEST(Flatness, IgnoresASlowRiseAndSeesASpike) {
   EXPECT_GT(flatness(frame_ms), 2.5);
 }
 
-TEST(Flatness, OfEqualFramesIsOne) {
+TEST(Flatness, EqualFramesGiveOne) {
   EXPECT_DOUBLE_EQ(flatness(std::vector<double>(7, 4.2)), 1.0);
   EXPECT_DOUBLE_EQ(flatness({}), 0.0);
 }

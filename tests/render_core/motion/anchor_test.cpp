@@ -36,7 +36,7 @@ TEST(Anchored, BeginsAtTheStartPoseAndKeepsGravityAndDistances) {
   EXPECT_NEAR(right.z, 0.0f, 1e-5f);
 }
 
-TEST(Anchored, OfNothingIsNothing) { EXPECT_TRUE(anchored({}, {}).empty()); }
+TEST(Anchored, AnEmptyTraceStaysEmpty) { EXPECT_TRUE(anchored({}, {}).empty()); }
 
 }  // namespace
 }  // namespace catgs

@@ -146,12 +146,12 @@ TEST_F(CameraPaths, MistakesNameTheirField) {
   expect_error("a.json", "[]", "lists no camera");
   expect_error("a.json", "{}", "lists no cameras (cameras.json of a 3DGS training");
   expect_error("a.json", R"({"camera_type": "fisheye", "camera_path": []})",
-               "camera_type: is no perspective camera");
+               "camera_type: is not a perspective camera");
   expect_error("a.json", R"({"camera_path": [{"camera_to_world": [1, 2]}]})",
                "camera_path[0].camera_to_world: is not a 4x4 matrix");
   expect_error("a.json", R"({"frames": [{"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0],
                              [0, 0, 5, 0], [0, 0, 0, 1]]}]})",
-               "frames[0].transform_matrix: is no rotation");
+               "frames[0].transform_matrix: is not a rotation");
   expect_error("a.json", R"([{"position": [0, 0, 0]}])", "[0]: 'rotation' is missing");
   expect_error("a.json", R"({"fps": 1e6, "camera_path": [{"camera_to_world":
                              [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}]})",

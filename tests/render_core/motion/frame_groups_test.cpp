@@ -41,19 +41,19 @@ TEST(UniformMotion, TakesTheShortWayAndNormalises) {
   EXPECT_NEAR(glm::length(end.orientation), 1.0f, 1e-6f);
 }
 
-TEST(MaxDisplacement, OfASidewaysStepIsThatOfTheNearestDepth) {
+TEST(MaxDisplacement, ASidewaysStepMovesTheNearestDepthMost) {
   // u = f x / z: 0.1 units at depth 2 are 1100 * 0.1 / 2 = 55 px everywhere in the image.
   EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0.1f, 0, 0}), 2.0f), 55.0f, 1e-3f);
   EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0.1f, 0, 0}), infinity), 0.0f, 1e-3f);
 }
 
-TEST(MaxDisplacement, OfAStepForwardIsThatOfTheCorners) {
+TEST(MaxDisplacement, AStepForwardMovesTheCornersMost) {
   // A point at radius r and depth z moves by r dz / (z - dz).
   const float corner = std::hypot(960.0f, 540.0f);
   EXPECT_NEAR(max_displacement_px(camera_at({}), moved({0, 0, 0.5f}), 2.0f), corner / 3.0f, 1e-2f);
 }
 
-TEST(MaxDisplacement, OfARotationNeedsNoDepth) {
+TEST(MaxDisplacement, ARotationNeedsNoDepth) {
   // Pan: at the left and right edge x = f tan(phi) goes to f tan(phi +- 1 deg).
   const double edge = std::atan(960.0 / 1100.0);
   const double expected = 1100.0 * std::tan(edge + glm::radians(1.0)) - 960.0;
@@ -90,7 +90,7 @@ TEST(MaxDeviation, IsTheDistanceFromTheTrail) {
   EXPECT_EQ(max_deviation_px(key, end, moved({0, 0, 1.9f}), 2.0f), infinity);
 }
 
-TEST(MaxDeviation, OfATurnNeedsNoDepth) {
+TEST(MaxDeviation, ATurnNeedsNoDepth) {
   const Camera key = camera_at({});
   const float turn = max_displacement_px(key, turned(1, {0, 1, 0}), infinity);
   EXPECT_FLOAT_EQ(max_deviation_px(key, {}, turned(1, {0, 1, 0}), infinity), turn);
@@ -186,7 +186,7 @@ TEST(FrameGroups, PlansTheCameraAtTheEndOfTheWindow) {
   EXPECT_EQ(sub.window, 1);
 }
 
-TEST(FrameGroups, WithoutForecastEveryFrameIsAKeyFrame) {
+TEST(FrameGroups, EveryFrameIsAKeyFrameWithoutForecast) {
   FrameGroups groups{SpeculationSettings{}};
   for (int i = 0; i < 3; ++i) {
     const FramePlan plan = groups.plan(camera_at({}), std::nullopt, 1.0f);

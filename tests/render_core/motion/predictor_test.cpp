@@ -179,7 +179,7 @@ TEST(Predictor, PromisesNoFrameBehindTheHorizon) {
     const auto forecast = predictor.forecast(now_us, c.rate_hz, c.asked);
     ASSERT_TRUE(forecast.has_value());
     EXPECT_EQ(forecast->frames, c.held) << c.rate_hz << " Hz, " << c.age_us << " us";
-    // The motion goes on as fast as it is, to the last frame that is promised.
+    // The motion keeps its speed up to the last promised frame.
     if (c.held == 0) continue;
     const auto end_us = now_us + static_cast<std::int64_t>(c.held * 1e6 / c.rate_hz);
     expect_near(forecast->world_from_camera, on_path(end_us).world_from_camera);
@@ -277,7 +277,7 @@ TEST(Predictor, TremorIsNoMotion) {
   }
 }
 
-TEST(Predictor, WhatIsTremorDependsOnTheScene) {
+TEST(Predictor, TheTremorThresholdDependsOnTheScene) {
   EXPECT_DOUBLE_EQ(forecast_lever(0.2f), 15.0 * static_cast<double>(0.2f));
   EXPECT_EQ(forecast_lever(0.0f), PredictorSettings{}.lever);
   for (const float near_z : {0.2f, 0.002f}) {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
+#include "render_core/metrics/summary.h"
 #include "render_core/motion/portable.h"
 #include "tests/support/temporary_folder.h"
 
@@ -62,10 +63,6 @@ std::vector<double> speeds_per_s(const Trajectory& trajectory) {
   }
   std::sort(speeds.begin(), speeds.end());
   return speeds;
-}
-
-double percentile(const std::vector<double>& sorted, double share) {
-  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 class EveryScript : public ::testing::TestWithParam<std::string> {};

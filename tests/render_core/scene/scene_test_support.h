@@ -122,7 +122,7 @@ inline void expect_near(const GaussianCloud& wanted, const GaussianCloud& read,
 /// to `error`: the component that is left out, at least 1/2, is then off by up to 3 times that.
 constexpr float smallest_three_angle(float error) { return 2.0f * 3.4641016f * error; }
 
-/// Of a test case that reads and writes files.
+/// A test case that reads and writes files.
 class FolderTest : public ::testing::Test {
  protected:
   std::filesystem::path write(const std::string& name, const std::string& content) const {

@@ -5,9 +5,10 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
+#include "render_core/base/portable.h"
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walker.h"
 #include "tests/render_core/walk/worlds.h"
+#include "tests/support/walker.h"
 
 namespace catgs::walk {
 namespace {
@@ -76,6 +77,35 @@ TEST(FindGround, NobodyFallsFromAnEdge) {
   const glm::vec3 eyes = eyes_of(map, at);
   EXPECT_GT(eyes.x, 6.48f);
   EXPECT_NEAR(eyes.z, 2.72f + test::eye_m, 0.1f);
+}
+
+TEST(FindGround, ARandomWalkPassesTheDoorAndNoWall) {
+  const glm::vec3 start(2, 2, 1.6f);
+  const WalkMap map = test::map_of(test::room(0.9f), start);
+  SplitMix64 random(1);
+  const auto random_way = [&] {
+    const float angle = 6.2831853f * static_cast<float>(random.next() >> 40) * 0x1p-24f;
+    return 0.4f * glm::vec2(std::cos(angle), std::sin(angle));
+  };
+  Stand at = stand_at(map, start);
+  glm::vec3 before = eyes_of(map, at);
+  int crossings = 0;
+  for (int leg = 0; leg < 400; ++leg) {
+    const glm::vec2 way = random_way();
+    for (int k = 0; k < 100; ++k) {
+      at = move(map, at, way);
+      const glm::vec3 eyes = eyes_of(map, at);
+      ASSERT_TRUE(eyes.x > 0.15f && eyes.x < 7.85f && eyes.y > 0.15f && eyes.y < 5.85f);
+      ASSERT_NEAR(eyes.z, test::eye_m, 0.1f);
+      ASSERT_FALSE(eyes.x > 1.0f && eyes.x < 2.0f && eyes.y > 4.0f && eyes.y < 5.0f) << "table";
+      if ((before.x < 4.0f) != (eyes.x < 4.0f)) {
+        ++crossings;
+        ASSERT_TRUE(eyes.y > 2.5f && eyes.y < 3.4f) << eyes.y;
+      }
+      before = eyes;
+    }
+  }
+  EXPECT_GT(crossings, 1);
 }
 
 TEST(FindGround, SteepSlopesAreNoGround) {

@@ -67,7 +67,7 @@ TEST(Occupancy, LargeGaussiansHaveNoHolesAndFaintOnesAreNotSolid) {
     EXPECT_EQ(runs_at(occupancy, {x, 0.5f, 0}).size(), 1u) << x;
 }
 
-TEST(Occupancy, WhatIsBeyondTheGridIsIgnored) {
+TEST(Occupancy, GaussiansBeyondTheGridAreIgnored) {
   GaussianCloud cloud;
   cloud.resize(3, 0);
   cloud.mean = {{1e9f, 0, 0}, {0, -1e9f, 0}, {0, 0, 300}};

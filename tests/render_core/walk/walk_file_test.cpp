@@ -90,7 +90,7 @@ TEST(WalkFile, ForgedFieldsAreNamed) {
   EXPECT_THAT(refusal(with(64, 0.0f)), HasSubstr("cell"));
   EXPECT_THAT(refusal(with(68, -1.0f)), HasSubstr("person"));
   EXPECT_THAT(refusal(with(92, nan)), HasSubstr("start"));
-  EXPECT_THAT(refusal(with(92, 2000.0f)), AllOf(HasSubstr("start"), HasSubstr("no clear ground")));
+  EXPECT_THAT(refusal(with(92, 2000.0f)), AllOf(HasSubstr("start"), HasSubstr("not clear ground")));
   EXPECT_THAT(refusal(with(104, 5000u)), HasSubstr("size"));
   EXPECT_THAT(refusal(with(104, 2u)), HasSubstr("a tile"));
   EXPECT_THAT(refusal(with(8, 1u)), HasSubstr("compute it with this version"));

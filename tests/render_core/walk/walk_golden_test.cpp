@@ -8,8 +8,8 @@
 
 #include "render_core/base/portable.h"
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walker.h"
 #include "tests/render_core/walk/worlds.h"
+#include "tests/support/walker.h"
 
 namespace catgs::walk {
 namespace {

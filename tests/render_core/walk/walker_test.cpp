@@ -1,4 +1,4 @@
-#include "render_core/walk/walker.h"
+#include "tests/support/walker.h"
 
 #include <gtest/gtest.h>
 

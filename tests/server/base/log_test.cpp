@@ -230,7 +230,7 @@ TEST(Log, AFullDiskLosesLinesAndSaysSo) {
   });
   ::close(full);
   ASSERT_EQ(all.size(), 2u);
-  EXPECT_THAT(all[0], HasSubstr("3 lines were lost"));
+  EXPECT_THAT(all[0], HasSubstr("3 log lines were dropped"));
   EXPECT_THAT(all[1], HasSubstr("room again"));
   EXPECT_EQ(log_lines_lost() - lost_before, 3u);
 }
@@ -294,7 +294,7 @@ TEST(Log, ADiskThatFillsWithinALineDoesNotSpoilTheNext) {
   ASSERT_EQ(all.size(), 3u);
   EXPECT_EQ(all[0].size(), 100u) << "torn";
   EXPECT_EQ(nlohmann::json::parse(all[1]).at("message"),
-            "3 lines were lost: standard error took none");
+            "3 log lines were dropped: stderr was blocked");
   EXPECT_FALSE(nlohmann::json::parse(all[1]).contains("session")) << "they were anybody's";
   EXPECT_EQ(nlohmann::json::parse(all[1]).at("event"), "log_lines_lost");
   EXPECT_EQ(nlohmann::json::parse(all[2]).at("session"), "1f2e3d4c");

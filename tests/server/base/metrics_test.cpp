@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 namespace catgs {
 namespace {
@@ -21,6 +22,22 @@ TEST(Metrics, ADeviceHasOneGaugeThatFollowsItsViews) {
   EXPECT_THAT(metrics.scrape(), HasSubstr("\ncatgs_device_views{device=\"0\"} 0\n"));
   EXPECT_THAT(metrics.scrape(), HasSubstr("\ncatgs_device_views{device=\"1\"} 3\n"));
   EXPECT_THAT(metrics.scrape(), Not(HasSubstr("{device=\"0\"} 2")));
+}
+
+TEST(Metrics, TheJsonHasWhatAScrapeHas) {
+  Metrics metrics;
+  metrics.set_views(1, 3);
+  metrics.frames_sent.Increment(2.0);
+  const auto json = nlohmann::json::parse(metrics.json());
+  EXPECT_EQ(json.at("catgs_device_views"),
+            nlohmann::json::parse(R"([{"labels": {"device": "1"}, "value": 3}])"));
+  EXPECT_EQ(json.at("catgs_frames_sent_total").at(0).at("value"), 2.0);
+  const auto& stage = json.at("catgs_frame_stage_seconds").at(0);
+  EXPECT_EQ(stage.at("sum"), 0.0);
+  EXPECT_TRUE(stage.at("buckets").back().at(0).is_null());
+  const std::string text = metrics.scrape();
+  for (const auto& [family, series] : json.items())
+    EXPECT_THAT(text, HasSubstr("# TYPE " + family + " "));
 }
 
 TEST(Metrics, PagesAreCountedBySceneAndDeviceAndGoWithTheScene) {

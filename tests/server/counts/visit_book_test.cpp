@@ -10,6 +10,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "render_core/base/error.h"
@@ -224,7 +225,7 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
   EXPECT_EQ(stops, static_cast<std::uint64_t>(visitors * rounds));
 }
 
-TEST_F(VisitBookTest, ThePageShowsWhatWasCountedAndEscapesIt) {
+TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
   const VisitBook book({}, counts_);
   const VisitsPage pages = page_of(book);
   counts_.visit("<hall>", DeviceKind::desktop);
@@ -233,13 +234,24 @@ TEST_F(VisitBookTest, ThePageShowsWhatWasCountedAndEscapesIt) {
   counts_.reach("<hall>", {0, 7});
   titles_ = std::make_shared<const std::vector<TourTitles>>(
       std::vector<TourTitles>{{"The <house>", {"Gate & door"}}});
-  const std::string all = rest_of(ask(pages, "/visits"));
-  EXPECT_THAT(all, AllOf(HasSubstr("1 visits, 2.0 hours"), HasSubstr("<td>1500</td>"),
-                         HasSubstr("scene=%3Chall%3E"), Not(HasSubstr("<hall>"))));
-  const std::string one = rest_of(ask(pages, "/visits", {"scene=<hall>", "days=7"}));
-  EXPECT_THAT(one, AllOf(HasSubstr("The &lt;house&gt;"), HasSubstr("Gate &amp; door"),
-                         HasSubstr("stop 8"), Not(HasSubstr("<house>"))));
-  EXPECT_THAT(rest_of(ask(pages, "/visits", {"days=-5"})), HasSubstr("1 days"));
+  const auto summary = [&](std::vector<std::string> arguments) {
+    return nlohmann::json::parse(rest_of(ask(pages, "/visits.json", std::move(arguments))));
+  };
+  const auto rows_of = [](const nlohmann::json& part) { return part.at("table").at("rows"); };
+  const auto all = summary({});
+  EXPECT_EQ(all.at("facts"), "1 visits, 2.0 hours");
+  const auto& days = all.at("parts").at(0).at("plots").at(1).at("curves").at(0);
+  EXPECT_EQ(days.at("x").back(), today);
+  EXPECT_EQ(days.at("y").back(), 2.0);
+  EXPECT_EQ(days.at("x").size(), 30u);
+  EXPECT_EQ(rows_of(all.at("parts").at(1)).dump(),
+            R"([[{"href":"/visits?days=30&scene=%3Chall%3E","text":"<hall>"},)"
+            R"(1,2.0,120.0,1500.0,1,0,0,0,0]])");
+  const auto one = summary({"scene=<hall>", "days=7"});
+  EXPECT_EQ(one.at("title"), "Visits: <hall>, 7 days");
+  EXPECT_EQ(rows_of(one.at("parts").at(2)).dump(),
+            R"([["The <house>","Gate & door",1],["The <house>","stop 8",1]])");
+  EXPECT_EQ(summary({"days=-5"}).at("title"), "Visits: all scenes, 1 days");
   EXPECT_EQ(ask(pages, "/visit").status, 404);
 }
 
@@ -262,13 +274,14 @@ TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
   };
   const VisitBook book(folder_.path(), counts_);
   const VisitsPage pages = page_of(book);
-  for (const char* path : {"/visits", "/visits.csv", "/visits/stops.csv"}) {
+  for (const char* path : {"/visits.json", "/visits.csv", "/visits/stops.csv"}) {
     for (const char* date : {"2025-11-22", "2025-11-23", "2025-11-24"}) write(date, "before");
     const HttpResponse response = ask(pages, path, {"days=4"});
     ASSERT_EQ(response.body, nullptr);
     write("2025-11-22", "changed_1");
     std::string text = response.next_piece().value();
-    if (std::string(path) != "/visits") text += response.next_piece().value();  // after its head
+    if (std::string(path) != "/visits.json")
+      text += response.next_piece().value();  // after its head
     write("2025-11-23", "changed_2");
     text += response.next_piece().value();
     write("2025-11-24", "changed_3");

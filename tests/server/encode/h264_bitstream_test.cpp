@@ -206,20 +206,5 @@ TEST(RewrittenSps, GoldenBytes) {
   EXPECT_EQ(golden(interlaced_main), "674d4028925280f0088fbc0440000003004000000ca3c58b96");
 }
 
-TEST(ParseSliceHead, ReadsFirstMacroblockAndType) {
-  // first_mb 0: '1'; slice_type 7 (I): '0001000'.
-  const auto idr = parse_slice_head({from_hex("6588")});
-  EXPECT_FALSE(parse_slice_head({from_hex("6742")}));
-  ASSERT_TRUE(idr);
-  EXPECT_EQ(idr->first_mb, 0u);
-  EXPECT_EQ(idr->type, SliceType::i);
-  // first_mb 3: '00100'; slice_type 5 (P): '00110'.
-  const auto p = parse_slice_head({from_hex("412180")});
-  ASSERT_TRUE(p);
-  EXPECT_EQ(p->first_mb, 3u);
-  EXPECT_EQ(p->type, SliceType::p);
-  EXPECT_FALSE(parse_slice_head({from_hex("41")}));
-}
-
 }  // namespace
 }  // namespace catgs::h264

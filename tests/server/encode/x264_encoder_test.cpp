@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -6,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
+#include "server/encode/bit_io.h"
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
 #include "server/encode/h264_bitstream.h"
@@ -30,6 +32,25 @@ EncoderSettings settings_of(glm::ivec2 size_px, int bitrate_kbps = 8000, int fps
 
 std::vector<h264::NalUnit> units_of(const EncodedFrame& frame) {
   return h264::split_annex_b(frame.bytes);
+}
+
+enum class SliceType { p, b, i, sp, si };
+
+struct SliceHead {
+  unsigned first_mb = 0;  // 0 begins a picture
+  SliceType type = SliceType::i;
+};
+
+/// The head of a slice (7.3.3), nothing for other units. The pictures of these tests are so small
+/// that it has no emulation prevention bytes.
+std::optional<SliceHead> slice_head(const h264::NalUnit& unit) {
+  if (unit.type() != h264::NalType::slice && unit.type() != h264::NalType::idr_slice)
+    return std::nullopt;
+  h264::BitReader reader(unit.bytes.subspan(1));
+  const std::uint32_t first_mb = reader.exp_golomb(), type = reader.exp_golomb();
+  EXPECT_FALSE(reader.failed());
+  EXPECT_LE(type, 9u);
+  return SliceHead{first_mb, static_cast<SliceType>(type % 5)};
 }
 
 std::vector<h264::NalType> types_of(const EncodedFrame& frame) {
@@ -96,10 +117,10 @@ TEST(X264Encoder, EveryFrameIsOneAccessUnitAndIdrsComeOnlyOnDemand) {
       int slices = 0;
       for (const h264::NalUnit& unit : units_of(out)) {
         EXPECT_NE(unit.type(), h264::NalType::access_unit_delimiter);
-        if (const auto slice = h264::parse_slice_head(unit)) {
+        if (const auto slice = slice_head(unit)) {
           ++slices;
           if (slice->first_mb == 0) ++pictures;
-          EXPECT_EQ(slice->type, out.idr ? h264::SliceType::i : h264::SliceType::p);
+          EXPECT_EQ(slice->type, out.idr ? SliceType::i : SliceType::p);
           EXPECT_EQ(unit.type(), out.idr ? h264::NalType::idr_slice : h264::NalType::slice);
         }
       }
@@ -243,8 +264,8 @@ TEST(X264Encoder, OtherPresetsKeepTheRules) {
     const EncodeStatus status = decoder.decode(out.bytes, decoded);
     ASSERT_TRUE(status.ok) << status.message;
     for (const h264::NalUnit& unit : units_of(out)) {
-      if (const auto slice = h264::parse_slice_head(unit)) {
-        EXPECT_EQ(slice->type, time == 0 ? h264::SliceType::i : h264::SliceType::p);
+      if (const auto slice = slice_head(unit)) {
+        EXPECT_EQ(slice->type, time == 0 ? SliceType::i : SliceType::p);
       }
     }
   }

@@ -55,9 +55,26 @@ TEST_F(Visits, AreSentAsFarAsTheyAreRead) {
   EXPECT_FALSE(csv.headers.contains("content-length"));
   EXPECT_EQ(std::ranges::count(csv.body, '\n'), 1 + 5 * 2000) << "of several pieces";
   EXPECT_THAT(csv.body, EndsWith("\"tour 1\",\"stop 2000\",1\r\n"));
-  const HttpReply page = http_get(server_->admin_port(), "/visits?days=7&scene=hall");
-  EXPECT_THAT(page.body, AllOf(HasSubstr("Visits: hall, 7 days"), HasSubstr("</html>")));
-  EXPECT_EQ(http_get(server_->admin_port(), "/visits.css").status, 200);
+  const HttpReply counts = http_get(server_->admin_port(), "/visits.json?days=7&scene=hall");
+  EXPECT_THAT(counts.body, AllOf(HasSubstr("Visits: hall, 7 days"), EndsWith("]}}]}")));
+}
+
+TEST_F(Visits, ThePageComesFromTheClientAndHasAPolicyOfItsOwn) {
+  const TemporaryFolder client;
+  const auto page_of = [&] {
+    const RunningServer server(
+        [&](ServerConfig& config) { config.client_dir = client.path().string(); });
+    return http_get(server.admin_port(), "/visits?days=7");
+  };
+  client.write("index.html", "<p>the client</p>");
+  const HttpReply none = page_of();
+  EXPECT_EQ(none.status, 404);
+  EXPECT_THAT(none.body, HasSubstr("/visits.json"));
+  client.write("charts.html", "<p>charts</p>");
+  const HttpReply page = page_of();
+  EXPECT_EQ(page.body, "<p>charts</p>");
+  EXPECT_THAT(page.headers.at("content-security-policy"),
+              AllOf(HasSubstr("default-src 'none'"), HasSubstr("connect-src 'self'")));
 }
 
 TEST_F(Visits, HaveNoChunksForClientsOfHttp10) {

@@ -46,7 +46,7 @@ TEST(PacketRing, KeepsOrder) {
   EXPECT_FALSE(ring.pop());
 }
 
-TEST(PacketRing, OverflowDropsToTheNextIdrAndCounts) {
+TEST(PacketRing, OverflowDropsToTheNextIdr) {
   PacketRing ring({.frames = 2, .frame_bytes = 1000, .messages = 4});
   EXPECT_THAT(ring.push(frame(1, true)), IsEmpty());
   EXPECT_THAT(ring.push(frame(2, false)), IsEmpty());
@@ -55,7 +55,6 @@ TEST(PacketRing, OverflowDropsToTheNextIdrAndCounts) {
   EXPECT_THAT(ring.push(frame(4, false)), ElementsAre(4)) << "undecodable without the dropped ones";
   EXPECT_THAT(ring.push(frame(5, true)), IsEmpty());
   EXPECT_THAT(ring.push(frame(6, false)), IsEmpty());
-  EXPECT_EQ(ring.dropped_frames(), 4u);
   EXPECT_THAT(all_popped(ring), ElementsAre(7, 105, 106)) << "messages survive";
   EXPECT_EQ(ring.frame_bytes(), 0u);
 }

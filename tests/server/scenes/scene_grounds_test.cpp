@@ -15,10 +15,10 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walker.h"
 #include "server/scenes/scene_library.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/render_core/walk/worlds.h"
+#include "tests/support/walker.h"
 
 namespace catgs::test {
 namespace {

@@ -112,7 +112,7 @@ TEST_F(OcclusionStage, LimitsAreNeverBeforeTheSurfaceTheyComeFrom) {
   }
 }
 
-TEST_F(OcclusionStage, WhatTheLastPictureDidNotShowIsNotLimited) {
+TEST_F(OcclusionStage, PartsOutsideTheLastPictureAreNotLimited) {
   const Pose last{};
   const Pose now = catgs::test::moved(last, {"yaw", {0, 0, 0}, {0, 0.4f, 0}});
   std::vector<float2> of_tiles;

@@ -99,7 +99,7 @@ TEST(Sidecar, ErrorsNameTheField) {
     EXPECT_EQ(refusal_of([&] { parse_sidecar(t.text); }), (Refusal{"city.json", t.where}))
         << t.text;
   EXPECT_EQ(input_error([] { parse_sidecar(R"({"mode": "swim"})"); }),
-            "city.json: mode: is no mode (write orbit, fly, walk)");
+            "city.json: mode: is not a mode (write orbit, fly, walk)");
 }
 
 class Hints : public FolderTest {

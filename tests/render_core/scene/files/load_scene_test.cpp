@@ -199,7 +199,7 @@ TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
   EXPECT_EQ(
       input_error([&] { load_scene(path); }),
       path.string() +
-          ": is no scene of a known format (supported: .ply (3DGS or compressed), .ssog, .sog, "
+          ": is not a scene of a known format (supported: .ply (3DGS or compressed), .ssog, .sog, "
           ".spz, .glb, .gltf, .lcc2, .tree, .ksplat, .splat, a folder with lod-meta.json (streamed "
           "SOG), tileset.json (3D Tiles) or meta.json (SOG), a training output folder)");
   LoadOptions level;

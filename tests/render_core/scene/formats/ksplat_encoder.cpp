@@ -8,12 +8,13 @@
 
 #include <glm/gtc/packing.hpp>
 
+#include "render_core/math/constants.h"
+
 namespace catgs::test {
 
 namespace {
 
 constexpr float block_size = 64.0f;
-constexpr double sh_constant = 0.28209479177387814;
 
 template <class T>
 void put(std::string& out, const T& value) {
@@ -55,7 +56,7 @@ void put_row(std::string& out, const GaussianCloud& cloud, std::size_t i, const 
   for (int k = 0; k < 3; ++k) number(cloud.scale[i][k]);
   const glm::quat& q = cloud.rotation[i];
   for (const float v : {q.w, q.x, q.y, q.z}) number(v);
-  for (int k = 0; k < 3; ++k) put_byte(out, 255 * (0.5 + sh_constant * cloud.sh_of(i)[0][k]));
+  for (int k = 0; k < 3; ++k) put_byte(out, 255 * (0.5 + sh_basis_0 * cloud.sh_of(i)[0][k]));
   put_byte(out, 255 * cloud.opacity[i]);
   for (int degree = 1; degree <= cloud.sh_degree; ++degree)
     for (int channel = 0; channel < 3; ++channel)

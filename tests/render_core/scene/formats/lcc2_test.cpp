@@ -122,7 +122,7 @@ TEST_F(Lcc2Test, GaussiansStandUp) {
       ASSERT_EQ(whole.sh_of(100 + i)[3], fine.sh_of(i)[3]);
       ASSERT_EQ(whole.sh_of(100 + i)[8], glm::vec3(0.0f));
     }
-    // Of a file's middle.
+    // From a file's middle.
     const GaussianCloud middle = read_levels(open({}, 250), two_threads());
     EXPECT_EQ(middle.mean[0], clouds_["0"].mean[40]);
     EXPECT_EQ(middle.mean[50], first.mean[0]);

@@ -149,7 +149,7 @@ TEST_F(StreamedSogTest, ManyFilesAreNotOpenAtOnce) {
   EXPECT_EQ(load().cloud.size(), 200u);
 }
 
-/// Of this process.
+/// This process's memory.
 std::size_t resident_bytes() {
   std::size_t size = 0, resident = 0;
   std::ifstream("/proc/self/statm") >> size >> resident;

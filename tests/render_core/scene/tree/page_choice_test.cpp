@@ -152,7 +152,7 @@ TEST(PageChoice, PagesInUseStayUnlessOthersNeedRoomMore) {
   EXPECT_FALSE(memory.holds(last));
 }
 
-// Slots that frames hold come free by themselves, so nothing more is dropped for want of them.
+// Slots held by frames become free by themselves, so no further page is dropped for them.
 TEST(PageChoice, NoMoreIsDroppedThanIsNeeded) {
   Memory memory(20);
   Cut all;

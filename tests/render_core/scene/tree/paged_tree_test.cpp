@@ -229,7 +229,7 @@ TEST_F(PagedTreeTest, AnIdleTreeGivesItsPagesUp) {
   EXPECT_GE(a.tree.table()->size(), 1u);
 }
 
-// A View at rest has what memory had room for. It is told when others leave more.
+// A View at rest has the pages that fitted into memory. It is woken when others free more.
 TEST_F(PagedTreeTest, ViewsAtRestLearnOfRoom) {
   Slots slots(12);
   Looked a(slots, tree()), b(slots, tree());

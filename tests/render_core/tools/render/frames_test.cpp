@@ -88,7 +88,7 @@ TEST_F(Frames, TheBackgroundIsBehindTheScene) {
     const Outcome outcome =
         frames(fmt::format("--script still --out {} --background={}", path("c.png"), wrong));
     EXPECT_EQ(outcome.exit_code, 2);
-    EXPECT_THAT(outcome.out, HasSubstr("is no colour (white, black or six"));
+    EXPECT_THAT(outcome.out, HasSubstr("is not a colour (white, black or six"));
   }
 }
 

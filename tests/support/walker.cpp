@@ -1,4 +1,4 @@
-#include "render_core/walk/walker.h"
+#include "tests/support/walker.h"
 
 #include <algorithm>
 #include <array>
@@ -17,6 +17,20 @@ namespace {
 constexpr float piece = 0.4f;  // cells; a body moves by at most this much at a time
 
 glm::ivec2 cell_of(const glm::vec2& place) { return glm::ivec2(glm::floor(place)); }
+
+/// Height of the ground (cells) at `place` for a walker whose ground was `height`: bilinear between
+/// the middles of cells. Empty if no clear ground is within a step.
+std::optional<float> ground_at(const WalkMap& map, const glm::vec2& place, float height) {
+  const Place* here = map.clear_at(glm::ivec2(glm::floor(place)), height);
+  if (!here) return std::nullopt;
+  const glm::vec2 corner = glm::floor(place - 0.5f), share = place - 0.5f - corner;
+  const auto at = [&](int x, int y) {
+    const Place* found = map.clear_at(glm::ivec2(corner) + glm::ivec2(x, y), here->cells());
+    return found ? found->cells() : here->cells();
+  };
+  return glm::mix(glm::mix(at(0, 0), at(1, 0), share.x), glm::mix(at(0, 1), at(1, 1), share.x),
+                  share.y);
+}
 
 /// One piece of a move. Between two cells that touch in a corner alone, the body passes through one
 /// of the two beside them.

@@ -10,15 +10,18 @@
 
 namespace catgs::walk {
 
+// A second implementation of the page's walker (web_client/src/walk). Golden files compare the two,
+// and tests of maps walk with it.
+
 /// The clear ground below a place of the world, where a person would come to stand.
 std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& place);
 
 /// The walker's eyes in the world.
 glm::vec3 eyes_of(const WalkMap& map, const Stand& stand);
 
-/// Where a walker comes that wants to move by `way` (east, north; cells). The body goes on as long
-/// as the ground under it is clear. Where it is not, the body slides: it takes the nearest of the
-/// directions up to 67.5 degrees aside that is free, as far as `way` points in that direction.
+/// Returns where a walker ends that wants to move by `way` (east, north; cells). The body moves as
+/// long as the ground under it is clear. Otherwise it slides: it takes the nearest free direction
+/// up to 67.5 degrees aside, as far as `way` points in that direction.
 Stand move(const WalkMap& map, const Stand& from, const glm::vec2& way);
 
 /// Whether a walker gets from `from` to `to` on the straight line.

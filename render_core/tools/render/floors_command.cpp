@@ -15,9 +15,9 @@
 #include "render_core/tools/commands.h"
 #include "render_core/tools/progress.h"
 #include "render_core/tools/scene_options.h"
-#include "render_core/tools/walk/plan_files.h"
 #include "render_core/walk/eye_height.h"
 #include "render_core/walk/find_ground.h"
+#include "render_core/walk/plan.h"
 #include "render_core/walk/walk_file.h"
 
 namespace catgs {
@@ -50,7 +50,7 @@ SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<Thre
 float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
   if (options.eye_height) {
     if (!(*options.eye_height > 0.0f && *options.eye_height <= 1e6f))
-      throw InputError("--eye-height", "", fmt::format("{} is no height", *options.eye_height),
+      throw InputError("--eye-height", "", fmt::format("{} is not a height", *options.eye_height),
                        "in the scene's units, over 0");
     return *options.eye_height;
   }
@@ -63,13 +63,39 @@ float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
   return *height;
 }
 
+void print_map(const walk::WalkMap& map, std::uint64_t file_bytes) {
+  const glm::vec2 size = glm::vec2(map.size) * map.grid.cell;
+  fmt::print("{:.1f} x {:.1f} units, {} x {} columns, {} points, {:.1f} kB; north is {}\n", size.x,
+             size.y, map.size.x, map.size.y, map.places.size(),
+             1e-3 * static_cast<double>(file_bytes), walk::north_of(map.grid));
+  for (std::size_t k = 0; k < map.storeys.size(); ++k) {
+    const walk::Storey& storey = map.storeys[k];
+    fmt::print("storey {}: {:.2f} eye heights above the start's ground, {:.1f} square units\n", k,
+               (storey.level - map.start.height) / walk::cells_per_eye_height,
+               static_cast<float>(storey.area) * map.grid.cell * map.grid.cell);
+  }
+}
+
+/// Writes the plan of each storey: `out`, or for several storeys plan-0.png, plan-1.png… from
+/// below, for a name of plan.png.
+void write_plans(const walk::WalkMap& map, const std::filesystem::path& out) {
+  for (std::size_t k = 0; k < map.storeys.size(); ++k) {
+    std::filesystem::path path = out;
+    if (map.storeys.size() > 1)
+      path.replace_filename(
+          fmt::format("{}-{}{}", out.stem().string(), k, out.extension().string()));
+    write_png(path, walk::draw_plan(map, k));
+    fmt::print("{}: plan of storey {}, {} is up\n", path.string(), k, walk::north_of(map.grid));
+  }
+}
+
 void floors(const FloorsOptions& options, bool quiet) {
   using Clock = std::chrono::steady_clock;
   const auto seconds_since = [](Clock::time_point t) {
     return std::chrono::duration<double>(Clock::now() - t).count();
   };
   if (std::filesystem::path(options.out).extension() != ".walk")
-    throw InputError(options.out, "", "is no name of a .walk file",
+    throw InputError(options.out, "", "is not the name of a .walk file",
                      "the server reads the ground of hall.ply from hall.walk");
   check_writable(options.out);
   const auto pool = std::make_shared<ThreadPool>(options.threads);
