@@ -17,8 +17,9 @@ std::size_t stops_of(const DayCounts& day) {
 std::size_t entries_of(const DayCounts& day) { return day.size() + stops_of(day); }
 
 SceneCounts& scene_of(const std::string& id, DayCounts& day) {
-  if (day.size() < VisitCounts::most_scenes || day.contains(id)) return day[id];
-  return day[std::string(VisitCounts::other_scenes)];
+  const std::string others(VisitCounts::other_scenes);
+  const std::size_t told_apart = day.size() - day.count(others);
+  return told_apart < VisitCounts::most_scenes || day.contains(id) ? day[id] : day[others];
 }
 
 /// `stops`: of the whole day.
