@@ -1,96 +1,22 @@
 // Scenes of a real library get trees, and are drawn from them.
 #include "server/scenes/scene_trees.h"
 
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <thread>
-
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
-#include "render_core/base/thread_pool.h"
 #include "render_core/math/look_at.h"
-#include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/tree/tree_shape.h"
-#include "server/scenes/scene_library.h"
 #include "tests/render_core/scene/formats/encoders.h"
-#include "tests/render_core/scene/scene_test_support.h"
+#include "tests/server/scenes/scene_trees_fixture.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
-namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
-
-using Entry = std::shared_ptr<const SceneEntry>;
-
-class SceneTreesTest : public FolderTest {
- protected:
-  void SetUp() override {
-    fs::create_directory(folder_ / "scenes");
-    save_scene(random_cloud(3000, 0), folder_ / "scenes/a.ply");
-    config_.scenes = {"synth:city:1000"};
-    config_.scene_folders = {folder_ / "scenes"};
-    config_.cache_dir = folder_ / "trees";
-    config_.gaussians_of_a_tree = 1000;
-  }
-  void start() {
-    library_.reset();  // which takes the cache with it
-    library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
-        [this] { return now_; });
-  }
-  /// Lets loads and builds end, and ticks, until it holds.
-  void run_until(const std::function<bool()>& holds) {
-    for (int i = 0; i < 20'000 && !holds(); ++i) {
-      io_.restart();
-      io_.poll();
-      library_->on_tick(now_);
-      std::this_thread::sleep_for(1ms);
-    }
-    ASSERT_TRUE(holds());
-  }
-  std::string id(const std::string& name) const { return library_->resolve(name); }
-  Entry in_memory(const std::string& name) const { return library_->in_memory(id(name)); }
-  /// As a visitor does, who asks with each tick.
-  Entry load(const std::string& name) {
-    run_until([&] { return std::holds_alternative<Entry>(library_->want(id(name), now_)); });
-    return in_memory(name);
-  }
-  /// Loads the scene, and waits until it is drawn from its tree. Nobody looks at it any more.
-  void build(const std::string& name) {
-    load(name);
-    run_until([&] { return in_memory(name)->in_pages; });
-  }
-  std::string state(const std::string& name) const {
-    const auto listing = library_->listing();
-    return std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id)->state;
-  }
-  std::vector<fs::path> trees() const {
-    std::vector<fs::path> trees;
-    for (const auto& entry : fs::directory_iterator(folder_ / "trees"))
-      if (entry.path().filename() != "lock") trees.push_back(entry.path());
-    return trees;
-  }
-  static std::string bytes_in(const fs::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
-  double built() const { return metrics_.trees_built.Value(); }
-  double failed() const { return metrics_.tree_builds_failed.Value(); }
-
-  boost::asio::io_context io_;
-  Metrics metrics_;
-  ServerConfig config_;
-  std::unique_ptr<SceneLibrary> library_;
-  TimePoint now_ = TimePoint{} + 1h;
-};
 
 TEST_F(SceneTreesTest, ASceneIsServedAtOnceAndThenFromItsTree) {
   start();
@@ -278,49 +204,6 @@ TEST_F(SceneTreesTest, OneTreeIsBuiltAtATime) {
   run_until([&] { return state("c").starts_with("building"); });
   EXPECT_THAT(state("d"), HasSubstr("waits")) << "asked for longer ago";
   run_until([&] { return built() == 3; });
-}
-
-TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
-  save_scene(random_cloud(100'000, 0), folder_ / "scenes/large.ply");  // 5.6 MB
-  save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");       // 7.1 MB
-  config_.scene_memory_mb = 6;
-  start();
-  load("large");
-  library_->on_tick(now_);
-  EXPECT_THAT(state("large"), HasSubstr("building tree"));
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
-  run_until([&] { return state("b").starts_with("building"); });
-  EXPECT_THAT(state("large"), HasSubstr("waits")) << "it is shown as a whole meanwhile";
-  run_until([&] { return built() == 2; });
-  EXPECT_EQ(failed(), 0);
-}
-
-TEST_F(SceneTreesTest, SceneInTwoFormsKeepsNobodyOut) {
-  save_scene(random_cloud(25'000, 3), folder_ / "scenes/b.ply");  // 5.9 MB, and 6.5 MB of pages
-  save_scene(random_cloud(5'000, 3), folder_ / "scenes/c.ply");   // 1.2 MB
-  config_.scene_memory_mb = 13;
-  config_.gaussians_of_a_tree = 20'000;
-  start();
-  Entry seen = load("b");
-  run_until([&] { return library_->newer_form(*seen) != nullptr; });
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("c"), now_)))
-      << "the form before goes as soon as its visitor has the new one";
-  seen.reset();
-  EXPECT_FALSE(load("c")->in_pages);
-}
-
-TEST_F(SceneTreesTest, BackgroundJobGoesOnWithTheTree) {
-  start();
-  load("a");
-  LeasedScene film = library_->lease(id("a"));
-  ASSERT_TRUE(film.lease);
-  EXPECT_FALSE(film.entry->in_pages);
-  run_until([&] { return film.lease->recalled(); });
-  const double with_both = metrics_.scene_bytes.Value();
-  film = {};
-  film = library_->lease(id("a"));
-  EXPECT_TRUE(film.entry->in_pages);
-  run_until([&] { return metrics_.scene_bytes.Value() < with_both; });
 }
 
 TEST_F(SceneTreesTest, OneOfTheSettingsIsReadyWhenTheServerIs) {

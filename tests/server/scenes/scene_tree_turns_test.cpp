@@ -1,0 +1,53 @@
+// Trees are built and taken into use without keeping visitors or jobs waiting.
+#include "tests/server/scenes/scene_trees_fixture.h"
+
+namespace catgs::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
+  save_scene(random_cloud(100'000, 0), folder_ / "scenes/large.ply");  // 5.6 MB
+  save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");       // 7.1 MB
+  config_.scene_memory_mb = 6;
+  start();
+  load("large");
+  library_->on_tick(now_);
+  EXPECT_THAT(state("large"), HasSubstr("building tree"));
+  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
+  run_until([&] { return state("b").starts_with("building"); });
+  EXPECT_THAT(state("large"), HasSubstr("waits")) << "it is shown as a whole meanwhile";
+  run_until([&] { return built() == 2; });
+  EXPECT_EQ(failed(), 0);
+}
+
+TEST_F(SceneTreesTest, SceneInTwoFormsKeepsNobodyOut) {
+  save_scene(random_cloud(25'000, 3), folder_ / "scenes/b.ply");  // 5.9 MB, and 6.5 MB of pages
+  save_scene(random_cloud(5'000, 3), folder_ / "scenes/c.ply");   // 1.2 MB
+  config_.scene_memory_mb = 13;
+  config_.gaussians_of_a_tree = 20'000;
+  start();
+  Entry seen = load("b");
+  run_until([&] { return library_->newer_form(*seen) != nullptr; });
+  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("c"), now_)))
+      << "the form before goes as soon as its visitor has the new one";
+  seen.reset();
+  EXPECT_FALSE(load("c")->in_pages);
+}
+
+TEST_F(SceneTreesTest, BackgroundJobGoesOnWithTheTree) {
+  start();
+  load("a");
+  LeasedScene film = library_->lease(id("a"));
+  ASSERT_TRUE(film.lease);
+  EXPECT_FALSE(film.entry->in_pages);
+  run_until([&] { return film.lease->recalled(); });
+  const double with_both = metrics_.scene_bytes.Value();
+  film = {};
+  film = library_->lease(id("a"));
+  EXPECT_TRUE(film.entry->in_pages);
+  run_until([&] { return metrics_.scene_bytes.Value() < with_both; });
+}
+
+}  // namespace
+}  // namespace catgs::test
