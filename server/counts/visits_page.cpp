@@ -55,7 +55,7 @@ Json plot(const std::string& title, const std::vector<std::pair<std::string, dou
           {"curves", Json::array({std::move(curve)})}};
 }
 
-Json link(const std::string& text, const std::string& href) {
+Json link(std::string_view text, const std::string& href) {
   return {{"text", text}, {"href", href}};
 }
 
