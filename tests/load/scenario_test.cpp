@@ -153,7 +153,8 @@ TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {
   outcome.requirements.emplace_back("errors<1");
   const auto document = chart_document(scenario, outcome);
   const auto& parts = document.at("parts");
-  EXPECT_EQ(parts.at(0).at("table").at("rows").at(0).at(2), "holds");
+  EXPECT_EQ(parts.at(0).at("table").at("rows").at(0).at(2), "does not hold")
+      << "a figure that was not measured";
   EXPECT_EQ(parts.at(1).at("table").at("rows").at(0).at(0), "<i>");
   const auto& plots = parts.at(2).at("plots");
   EXPECT_EQ(plots.size(), 6u);
@@ -168,7 +169,7 @@ TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {
 
   const std::string page = with_document("<a id=\"document\"></a>", document);
   EXPECT_THAT(page, HasSubstr(R"(id="document">{"title":"<\/script>",)"));
-  EXPECT_THAT(page, EndsWith("]}]}</a>"));
+  EXPECT_THAT(page, EndsWith("]]}}]}</a>"));
   EXPECT_THROW(with_document("<html></html>", document), InputError);
 }
 

@@ -183,7 +183,7 @@ TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
   EXPECT_THAT(mistake("[]"), HasSubstr("is not a JSON object"));
   EXPECT_THAT(mistake(R"({"near": -1})"), HasSubstr("near: is not positive"));
   EXPECT_THAT(mistake(R"({"start_pose":{"position":[3e38,3e38,3e38],"look_at":[0,0,0]}})"),
-              HasSubstr("start_pose.position: is no place"));
+              HasSubstr("start_pose.position: is not a position"));
   EXPECT_THAT(mistake(R"({"poster": 1})"), HasSubstr("unknown field 'poster'"));
   EXPECT_THAT(mistake(R"({"tours": {}})"), HasSubstr("tours: is not an array"));
   EXPECT_THAT(mistake(R"({"tours": [1]})"), HasSubstr("tours[0]: is not an object"));
