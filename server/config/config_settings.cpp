@@ -42,7 +42,7 @@ T parse_number(std::string_view text, T low, T high) {
     throw std::invalid_argument(fmt::format("\"{}\" is not a {} in {}…{}", text,
                                             std::is_integral_v<T> ? "whole number" : "number", low,
                                             high));
-  return value;
+  return value + T{0};  // -0 is 0
 }
 
 template <class T>
