@@ -112,6 +112,13 @@ std::string read_key_file(std::string_view flag, const std::filesystem::path& pa
   return key;
 }
 
+std::string read_own_key(const std::filesystem::path& resume_key_file,
+                         const std::filesystem::path& token_key_file) {
+  if (!resume_key_file.empty()) return read_key_file("--resume-key-file", resume_key_file);
+  if (!token_key_file.empty()) return read_key_file("--token-key-file", token_key_file);
+  return random_key();
+}
+
 std::chrono::seconds parse_duration(std::string_view text) {
   std::int64_t count = 0;
   const char* end = text.data() + text.size();

@@ -39,6 +39,11 @@ std::optional<LinkGrant> read_link_token(std::string_view token, std::string_vie
 /// flag of the path.
 std::string read_key_file(std::string_view flag, const std::filesystem::path& path);
 
+/// The key of what a server signs for its own clients: of the first file that is given, or random.
+/// Servers of a fleet have it in common.
+std::string read_own_key(const std::filesystem::path& resume_key_file,
+                         const std::filesystem::path& token_key_file);
+
 /// "90s", "30m", "12h", "7d". Throws InputError.
 std::chrono::seconds parse_duration(std::string_view text);
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -233,32 +236,39 @@ DayByDay::Parts summary_parts(const HttpRequest& request, std::int64_t unix_s,
   return parts;
 }
 
-}  // namespace
-
-std::optional<HttpResponse> VisitsPage::respond(const HttpRequest& request) const {
-  DayByDay::Parts parts;
-  parts.dates = [&book = book_] { return book.dates(); };
+HttpResponse day_by_day(const VisitBook& book, DayByDay::Parts parts, std::string content_type) {
   HttpResponse response;
-  response.content_type = "text/csv; charset=utf-8";
-  if (request.path == "/visits.json") {
-    parts = summary_parts(request, unix_s_(), titles_of_);
-    response.content_type = "application/json";
-  } else if (request.path == "/visits.csv") {
-    parts.head =
-        fmt::format("date,scene,visits,seconds,bytes,{}\r\n", fmt::join(device_names, ","));
-    parts.of_day = counts_rows;
-  } else if (request.path == "/visits/stops.csv") {
-    parts.head = "date,scene,tour,stop,tour title,stop title,visits\r\n";
-    parts.of_day = [titles_of = titles_of_](const std::string& date, const DayCounts& day) {
-      return stops_rows(date, day, titles_of);
-    };
-  } else {
-    return std::nullopt;
-  }
-  response.next_piece = [document = std::make_shared<DayByDay>(book_, std::move(parts))] {
+  response.content_type = std::move(content_type);
+  response.next_piece = [document = std::make_shared<DayByDay>(book, std::move(parts))] {
     return document->next();
   };
   return response;
+}
+
+/// Of all days that were kept.
+HttpResponse csv(const VisitBook& book, std::string head,
+                 std::function<std::string(const std::string& date, const DayCounts& day)> of_day) {
+  return day_by_day(book, {std::move(head), [&book] { return book.dates(); }, std::move(of_day)},
+                    "text/csv; charset=utf-8");
+}
+
+}  // namespace
+
+HttpResponse VisitsPage::charts(const HttpRequest& request) const {
+  return day_by_day(book_, summary_parts(request, unix_s_(), titles_of_), "application/json");
+}
+
+HttpResponse VisitsPage::visits_csv() const {
+  return csv(book_,
+             fmt::format("date,scene,visits,seconds,bytes,{}\r\n", fmt::join(device_names, ",")),
+             counts_rows);
+}
+
+HttpResponse VisitsPage::stops_csv() const {
+  return csv(book_, "date,scene,tour,stop,tour title,stop title,visits\r\n",
+             [titles_of = titles_of_](const std::string& date, const DayCounts& day) {
+               return stops_rows(date, day, titles_of);
+             });
 }
 
 }  // namespace catgs

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,9 +13,8 @@
 
 namespace catgs {
 
-/// The counts on the admin port: "/visits.json", which charts.html shows as "/visits",
-/// "/visits.csv" and "/visits/stops.csv". Network thread. Days are read while an answer is sent,
-/// one at a time, on other threads.
+/// The counts on the admin port. Network thread. Days are read while an answer is sent, one at a
+/// time, on other threads.
 class VisitsPage {
  public:
   using Titles = std::shared_ptr<const std::vector<TourTitles>>;
@@ -27,8 +25,10 @@ class VisitsPage {
   VisitsPage(const VisitBook& book, std::function<std::int64_t()> unix_s, TitlesOf titles_of)
       : book_(book), unix_s_(std::move(unix_s)), titles_of_(std::move(titles_of)) {}
 
-  /// Returns nothing for any other path. The query may have `scene`, an id, and `days`.
-  [[nodiscard]] std::optional<HttpResponse> respond(const HttpRequest& request) const;
+  /// The document that charts.html shows. The query may have `scene`, an id, and `days`.
+  [[nodiscard]] HttpResponse charts(const HttpRequest& request) const;
+  [[nodiscard]] HttpResponse visits_csv() const;
+  [[nodiscard]] HttpResponse stops_csv() const;
 
  private:
   const VisitBook& book_;

@@ -1,6 +1,5 @@
 #include "server/films/film_studio.h"
 
-#include <algorithm>
 #include <array>
 #include <span>
 #include <utility>
@@ -22,19 +21,9 @@ using namespace std::chrono_literals;
 constexpr auto longest_job = 2h;
 constexpr auto look_again = 20ms;
 constexpr auto ask_again = 250ms;  // for a scene
-constexpr std::string_view folder = "/api/films/", file_part = "/file", cancel_part = "/cancel";
 
 /// Thrown by the artist's callback.
 struct Cancelled {};
-
-/// Returns JOB of "/api/films/JOB<what>".
-std::optional<std::string_view> job_of(std::string_view path, std::string_view what) {
-  if (!path.starts_with(folder) || !path.ends_with(what)) return std::nullopt;
-  path.remove_prefix(folder.size());
-  path.remove_suffix(std::min(what.size(), path.size()));
-  if (path.empty() || path.find('/') != path.npos) return std::nullopt;
-  return path;
-}
 
 HttpResponse json_response(int status, const nlohmann::json& document) {
   return text_response(status,
@@ -57,26 +46,25 @@ FilmStudio::~FilmStudio() {
   artist_.join();
 }
 
-std::optional<HttpResponse> FilmStudio::respond(const HttpRequest& request) {
-  if (const auto id = job_of(request.path, file_part)) {
-    const auto job = find(*id);
-    if (job && !has_ended(*job))
-      return text_response(
-          404, fmt::format("404: it is not ready yet: {}{} says how far it is\n", folder, *id));
-    if (!job || !job->result) return no_such_job();
-    HttpResponse response;
-    response.content_type = job->kind == FilmKind::film ? "video/mp4" : "image/png";
-    response.disk_body = std::make_shared<const DiskBody>(DiskBody{
-        job->result->size(), [file = job->result](std::uint64_t offset, std::size_t bytes) {
-          std::string piece(bytes, '\0');
-          if (!file->read(offset, std::as_writable_bytes(std::span(piece)))) piece.clear();
-          return piece;
-        }});
-    return response;
-  }
-  const auto id = job_of(request.path, "");
-  if (!id) return std::nullopt;
-  const auto job = find(*id);
+HttpResponse FilmStudio::result(std::string_view id) {
+  const auto job = find(id);
+  if (job && !has_ended(*job))
+    return text_response(
+        404, fmt::format("404: it is not ready yet: /api/films/{} says how far it is\n", id));
+  if (!job || !job->result) return no_such_job();
+  HttpResponse response;
+  response.content_type = job->kind == FilmKind::film ? "video/mp4" : "image/png";
+  response.disk_body = std::make_shared<const DiskBody>(
+      DiskBody{job->result->size(), [file = job->result](std::uint64_t offset, std::size_t bytes) {
+                 std::string piece(bytes, '\0');
+                 if (!file->read(offset, std::as_writable_bytes(std::span(piece)))) piece.clear();
+                 return piece;
+               }});
+  return response;
+}
+
+HttpResponse FilmStudio::report(std::string_view id) {
+  const auto job = find(id);
   if (!job) return no_such_job();
   constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
   nlohmann::json report = {{"state", names[static_cast<std::size_t>(job->state)]},
@@ -92,20 +80,14 @@ std::optional<FilmReport> FilmStudio::find(std::string_view id) {
   return job && !around_.ended(job->owner) ? job : std::nullopt;
 }
 
-bool FilmStudio::cancels(const HttpRequest& request) {
-  return job_of(request.path, cancel_part).has_value();
-}
-
-std::optional<HttpResponse> FilmStudio::refuse_cancel(const HttpRequest& request) {
-  const auto job = find(*job_of(request.path, cancel_part));
+std::optional<HttpResponse> FilmStudio::refuse_cancel(std::string_view id) {
+  const auto job = find(id);
   return job && !has_ended(*job) ? std::nullopt : std::optional(no_such_job());
 }
 
-std::future<HttpResponse> FilmStudio::cancel(const HttpRequest& request) {
-  std::promise<HttpResponse> answer;
-  const bool cancelled = queue_.cancel(*job_of(request.path, cancel_part));
-  answer.set_value(cancelled ? text_response(200, "cancelled\n") : no_such_job());
-  return answer.get_future();
+HttpResponse FilmStudio::cancel(std::string_view id) {
+  if (auto refusal = refuse_cancel(id)) return *std::move(refusal);
+  return queue_.cancel(id) ? text_response(200, "cancelled\n") : no_such_job();
 }
 
 std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string owner,

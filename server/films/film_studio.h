@@ -23,14 +23,9 @@
 namespace catgs {
 
 /// Takes authors' orders of pictures and films, draws them one after the other on a thread of low
-/// priority, and hands out the results:
-///   PUT /api/scenes/ID/films     an order (film_wish.h); answers 202 with {"id": JOB}
-///   GET /api/films/JOB           {"state", "share", "seconds_left", "bytes", "error"}
-///   GET /api/films/JOB/file      the result
-///   PUT /api/films/JOB/cancel
-/// A JOB is 128 random bits: whoever knows it may ask for it, until its order's link is revoked.
-/// While visitors look at scenes, at most half of the time is spent on drawing. A scene whose
-/// memory visitors need is let go between two pictures.
+/// priority, and hands out the results. A job's id is 128 random bits: whoever knows it may ask for
+/// it, until its order's link is revoked. While visitors look at scenes, at most half of the time
+/// is spent on drawing. A scene whose memory visitors need is let go between two pictures.
 class FilmStudio {
  public:
   struct Surroundings {
@@ -47,16 +42,17 @@ class FilmStudio {
   FilmStudio(const FilmStudio&) = delete;
   FilmStudio& operator=(const FilmStudio&) = delete;
 
-  // Network thread.
-  /// Answers a GET; nothing: the path is none of these.
-  std::optional<HttpResponse> respond(const HttpRequest& request);
-  /// True if this PUT cancels a job.
-  [[nodiscard]] static bool cancels(const HttpRequest& request);
-  /// Refuses such a PUT unless its job waits or is being drawn.
-  std::optional<HttpResponse> refuse_cancel(const HttpRequest& request);
-  std::future<HttpResponse> cancel(const HttpRequest& request);
-  /// The caller has checked that the sender may save the scene. `owner`: id of its token. One whose
-  /// place is abandoned meanwhile orders nothing.
+  // Network thread. `id`: of a job.
+  /// {"state", "share", "seconds_left", "bytes", "error"}
+  HttpResponse report(std::string_view id);
+  /// The picture or film.
+  HttpResponse result(std::string_view id);
+  /// Returns a refusal unless the job waits or is being drawn.
+  std::optional<HttpResponse> refuse_cancel(std::string_view id);
+  HttpResponse cancel(std::string_view id);
+  /// Takes an order (film_wish.h); answers 202 with {"id": JOB}. The caller has checked that the
+  /// sender may save the scene. `owner`: id of its token. One whose place is abandoned meanwhile
+  /// orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
                                   std::shared_ptr<const UploadPlace> place);
 

@@ -143,14 +143,6 @@ bool host_allowed(std::string_view host, Names names, const std::vector<std::str
          });
 }
 
-std::optional<std::string_view> scene_of(std::string_view path, std::string_view what) {
-  constexpr std::string_view folder = "/api/scenes/";
-  if (!path.starts_with(folder) || !path.ends_with(what) ||
-      path.size() <= folder.size() + what.size())
-    return std::nullopt;
-  return path.substr(folder.size(), path.size() - folder.size() - what.size());
-}
-
 HttpResponse redirect_to_https(std::string_view host, const HttpRequest& request) {
   if (host.empty() || !has_only(host, ".-_:[]"))
     return text_response(400, "400: this port speaks https\n");

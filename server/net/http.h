@@ -14,8 +14,9 @@ namespace catgs {
 
 class UploadPlace;
 
-/// A GET or HEAD request, or the head of a PUT request. Other methods are answered before a handler
-/// sees them.
+enum class HttpMethod { get, put, delete_ };  // HEAD is a GET without its body
+
+/// A request, or the head of a PUT request. Other methods are answered before a handler sees them.
 struct HttpRequest {
   std::string_view path;  // decoded, starts with '/', no query
   std::string_view if_none_match;
@@ -26,6 +27,7 @@ struct HttpRequest {
   std::string_view if_match = {};
   std::string_view range = {};
   std::string_view if_range = {};
+  HttpMethod method = HttpMethod::get;
 };
 
 /// A body that is read from the disk piece by piece while it is sent.
@@ -138,9 +140,6 @@ enum class Names {
 /// True if a request with this Host header is accepted. Hosts of `allowed` origins always are, as a
 /// proxy may forward them. A request without a Host is too, because no browser sends one.
 bool host_allowed(std::string_view host, Names names, const std::vector<std::string>& allowed);
-
-/// Returns the id in "/api/scenes/ID<what>".
-std::optional<std::string_view> scene_of(std::string_view path, std::string_view what);
 
 /// Answers a plain HTTP request to a port that serves https: status 308 to the same page, or 400 if
 /// `host` is none. The browser keeps the fragment, which may be a token.

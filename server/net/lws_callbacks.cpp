@@ -44,6 +44,11 @@ bool is_get_or_head(lws* wsi) {
          lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
 }
 
+bool is_served_delete(lws* wsi) {
+  return lws_hdr_total_length(wsi, WSI_TOKEN_DELETE_URI) > 0 &&
+         site_of(wsi).serves_delete(request_header(wsi, WSI_TOKEN_DELETE_URI));
+}
+
 // Results of callbacks.
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
@@ -96,11 +101,13 @@ int on_request(lws* wsi, HttpSlot& slot) {
     slot.exchange = new_exchange(wsi);
     return on_put(wsi, *slot.exchange);
   }
-  if (!is_get_or_head(wsi)) return refuse_request(wsi, 405, "only GET and HEAD are served here");
+  if (!is_get_or_head(wsi) && !is_served_delete(wsi))
+    return refuse_request(wsi, 405, "only GET and HEAD are served here");
   // The body of a GET has no meaning, and libwebsockets would report it while the answer is being
   // sent.
   if (const auto bytes = body_length(wsi); bytes != 0)
-    return refuse_request(wsi, bytes ? 413 : 400, "a GET needs no body");
+    return refuse_request(wsi, bytes ? 413 : 400,
+                          is_get_or_head(wsi) ? "a GET needs no body" : "a DELETE needs no body");
   slot.exchange = new_exchange(wsi);
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
   const HttpHandler handler = [&](const HttpRequest& request) {

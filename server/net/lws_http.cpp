@@ -118,7 +118,10 @@ std::optional<std::uint64_t> body_length(lws* wsi) {
 
 int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::string& site) {
   head_only_ = lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) > 0;
-  const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI : WSI_TOKEN_GET_URI);
+  const bool deletes = lws_hdr_total_length(wsi, WSI_TOKEN_DELETE_URI) > 0;
+  const std::string path = request_header(wsi, head_only_ ? WSI_TOKEN_HEAD_URI
+                                               : deletes  ? WSI_TOKEN_DELETE_URI
+                                                          : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
@@ -126,6 +129,7 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
   const std::string if_range = request_header(wsi, WSI_TOKEN_HTTP_IF_RANGE);
   HttpRequest request{path,          if_none_match, encodings.find("gzip") != std::string::npos,
                       authorization, site,          query_arguments(wsi)};
+  if (deletes) request.method = HttpMethod::delete_;
   if (!head_only_) {  // RFC 9110: ranges are for GET
     request.range = range;
     request.if_range = if_range;
@@ -203,6 +207,7 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
   }
   HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
   request.if_match = precondition_.if_match;
+  request.method = HttpMethod::put;
   lws_rx_flow_control(wsi, 0);  // see AnsweredConnections
   answer_ = uploads.take(request, std::move(body_), place_);
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);

@@ -39,6 +39,15 @@ bool came_by_tls(lws* wsi) {
          custom_header(wsi, "x-forwarded-proto:") == "https";
 }
 
+/// Refuses a request that changes something, if another site's page sent it. `what`: for the log.
+std::optional<HttpResponse> refuse_origin(lws* wsi, std::string_view what,
+                                          const std::string& host) {
+  const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
+  if (origin_allowed(origin, host, site_of(wsi).allowed_origins)) return std::nullopt;
+  note_refused_origin(wsi, what, origin, host);
+  return text_response(403, "403: pages of this origin may not save here\n");
+}
+
 }  // namespace
 
 const Site& site_of(lws* wsi) {
@@ -125,6 +134,8 @@ HttpResponse refuse_host(lws* wsi, const std::string& host) {
 HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request) {
   const Site& site = site_of(wsi);
   if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
+  if (request.method == HttpMethod::delete_)
+    if (auto refusal = refuse_origin(wsi, "request", host)) return *std::move(refusal);
   HttpResponse response = site.http(request);
   if (response.status == 401)
     note_refused(wsi, 401, fmt::format("request refused: {}", reason(response)));
@@ -135,14 +146,12 @@ std::optional<HttpResponse> refuse_upload(lws* wsi) {
   const Site& site = site_of(wsi);
   const std::string host = request_header(wsi, WSI_TOKEN_HOST);
   if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
-  const std::string origin = request_header(wsi, WSI_TOKEN_ORIGIN);
-  if (!origin_allowed(origin, host, site.allowed_origins)) {
-    note_refused_origin(wsi, "upload", origin, host);
-    return text_response(403, "403: pages of this origin may not save here\n");
-  }
+  if (auto refusal = refuse_origin(wsi, "upload", host)) return refusal;
   const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
   const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  auto refusal = site.uploads.refusal({path, {}, false, authorization});
+  HttpRequest request{path, {}, false, authorization};
+  request.method = HttpMethod::put;
+  auto refusal = site.uploads.refusal(request);
   if (refusal)
     note_refused(wsi, static_cast<unsigned>(refusal->status),
                  fmt::format("upload refused: {}", reason(*refusal)));

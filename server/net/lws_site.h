@@ -19,7 +19,8 @@ namespace catgs {
 struct Site {
   HttpHandler http;
   HttpUploads uploads;
-  ConnectionAcceptor accept;  // null: no websockets
+  std::function<bool(std::string_view path)> serves_delete;  // see NetOptions
+  ConnectionAcceptor accept;                                 // null: no websockets
   std::vector<std::string> allowed_origins;
   std::string policy;
   Names names = Names::loopback;
@@ -65,7 +66,7 @@ int confirm_upgrade(lws* wsi);
 
 HttpResponse refuse_host(lws* wsi, const std::string& host);
 
-/// Returns the answer of Site::http if the host is allowed.
+/// Returns the answer of Site::http if the host is allowed and, for DELETE, the origin.
 HttpResponse respond(lws* wsi, const std::string& host, const HttpRequest& request);
 
 /// Returns the refusal of an upload; nothing: its body may come.

@@ -142,6 +142,7 @@ NetServer::NetServer(NetOptions options)
   s.on_failed = std::move(options.on_failed);
   s.site = {std::move(options.http),
             std::move(options.uploads),
+            std::move(options.serves_delete),
             std::move(options.accept),
             options.allowed_origins,
             content_security_policy(options.embed_origins, options.media_origins),
@@ -151,6 +152,7 @@ NetServer::NetServer(NetOptions options)
             options.on_refused};
   s.admin_site = {std::move(options.admin_http),
                   {},
+                  [](std::string_view) { return false; },
                   nullptr,
                   options.allowed_origins,
                   content_security_policy({}),

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/base/log_event.h"
@@ -21,8 +22,10 @@ struct Endpoint {
 
 struct NetOptions {
   Endpoint listen;
-  HttpHandler http;              // pages and /api of the public port
-  HttpUploads uploads;           // to the public port
+  HttpHandler http;     // pages and /api of the public port
+  HttpUploads uploads;  // to the public port
+  /// True if `http` answers DELETE requests for this path. Others get status 405. Network thread.
+  std::function<bool(std::string_view path)> serves_delete = [](std::string_view) { return false; };
   ConnectionAcceptor accept;     // websockets of subprotocol catgs.v1, on any path
   bool asks_for_tokens = false;  // scenes are shown only with a token
   std::vector<std::string> allowed_origins;

@@ -23,19 +23,6 @@ constexpr std::int64_t pass_valid_s = 4 * 3600;
 /// The policy of a file that somebody opens by its address. Such a file can do nothing at all.
 constexpr std::string_view file_policy = "default-src 'none'; sandbox";
 
-struct FilePath {
-  std::string_view scene;
-  std::string_view name;
-};
-
-/// Names have no slash, so the last one ends the folder.
-std::optional<FilePath> file_in(std::string_view path) {
-  const auto slash = path.rfind('/');
-  if (slash == path.npos) return std::nullopt;
-  const auto scene = scene_of(path.substr(0, slash), "/media");
-  return scene ? std::optional(FilePath{*scene, path.substr(slash + 1)}) : std::nullopt;
-}
-
 HttpResponse not_there(std::string_view name) {
   return text_response(404, fmt::format("404: this scene has no picture, film or sound \"{}\"\n",
                                         is_media_name(name) ? name : ""));
@@ -97,29 +84,11 @@ HttpResponse listing_of(const MediaFolder& folder) {
 
 }  // namespace
 
-bool MediaApi::is_file(std::string_view path) { return file_in(path).has_value(); }
-
-std::optional<HttpResponse> MediaApi::respond(const HttpRequest& request) {
-  const SceneLibrary& scenes = parts_.scenes;
-  if (const auto wish = scene_of(request.path, "/media"))
-    return list(request, scenes.resolve(*wish));
-  if (const auto wish = scene_of(request.path, "/media-pass"))
-    return make_pass(request, scenes.resolve(*wish));
-  if (const auto path = file_in(request.path))
-    return file(request, scenes.resolve(path->scene), std::string(path->name));
-  return std::nullopt;
-}
-
 std::optional<MediaFolder> MediaApi::folder_of(std::string_view scene_id) const {
   const auto listing = parts_.scenes.listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end() || found->sidecar.empty()) return std::nullopt;
   return MediaFolder(found->sidecar);
-}
-
-Refusal MediaApi::refusal(const HttpRequest& request, std::string_view scene_id) const {
-  if (has_pass(request, scene_id)) return std::nullopt;
-  return permit_of(parts_.authorize, request).refusal(scene_id, Use::list);
 }
 
 /// A pass says: the scene, when it ends, and the id of the token that it was made for.
@@ -141,18 +110,14 @@ bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) c
   return false;
 }
 
-HttpResponse MediaApi::make_pass(const HttpRequest& request, const std::string& scene_id) const {
-  const Permit permit = permit_of(parts_.authorize, request);
-  if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
+HttpResponse MediaApi::make_pass(const std::string& scene_id, const Permit& permit) const {
   const std::int64_t end_s = std::min(parts_.now_unix_s() + pass_valid_s, permit.expires_unix_s);
   return text_response(
       200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.token_id),
                       parts_.key));
 }
 
-HttpResponse MediaApi::list(const HttpRequest& request, const std::string& scene_id) const {
-  const Permit permit = permit_of(parts_.authorize, request);
-  if (auto refused = refuse_change(parts_.scenes, permit, scene_id)) return *std::move(refused);
+HttpResponse MediaApi::list(const std::string& scene_id) const {
   const auto folder = folder_of(scene_id);
   HttpResponse response;
   if (!folder)
@@ -164,7 +129,6 @@ HttpResponse MediaApi::list(const HttpRequest& request, const std::string& scene
 
 HttpResponse MediaApi::file(const HttpRequest& request, const std::string& scene_id,
                             const std::string& name) const {
-  if (const auto refused = refusal(request, scene_id)) return unauthorized(*refused);
   const auto folder = folder_of(scene_id);
   if (!folder || !is_media_name(name)) return not_there(name);
   HttpResponse response;
@@ -176,33 +140,29 @@ HttpResponse MediaApi::file(const HttpRequest& request, const std::string& scene
   return response;
 }
 
-std::optional<HttpResponse> MediaApi::refuse_upload(const HttpRequest& request) {
-  const auto path = file_in(request.path).value();
-  const std::string scene_id = parts_.scenes.resolve(path.scene);
-  const Permit permit = permit_of(parts_.authorize, request);
-  if (auto refused = refuse_change(parts_.scenes, permit, scene_id)) return refused;
-  if (!is_media_name(path.name) || !media_kind_named(path.name))
+std::optional<HttpResponse> MediaApi::refuse_upload(const std::string& scene_id,
+                                                    std::string_view name) const {
+  if (!is_media_name(name) || !media_kind_named(name))
     return text_response(
         400, fmt::format("400: \"{}\" is no name of a picture, film or sound: use letters, digits, "
                          ". - and _, and an extension such as .jpg, .mp4, .mp3 or .vtt\n",
-                         printable(path.name)));
+                         printable(name)));
   if (!folder_of(scene_id))
     return text_response(409, "409: the scene is no file in memory: open it, then try again\n");
   return std::nullopt;
 }
 
-std::future<HttpResponse> MediaApi::save(const HttpRequest& request, std::string content,
+std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::string& scene_id,
+                                         std::string name, std::string content,
                                          std::shared_ptr<const UploadPlace> place) {
-  const auto path = file_in(request.path).value();
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
-  const std::string scene_id = parts_.scenes.resolve(path.scene);
   const auto folder = folder_of(scene_id);
   if (!folder) {
     answer->set_value(text_response(409, "409: the scene left the memory: open it again\n"));
     return future;
   }
-  const auto write = [folder = *folder, scene_id, name = std::string(path.name),
+  const auto write = [folder = *folder, scene_id, name = std::move(name),
                       precondition = Precondition{std::string(request.if_match),
                                                   std::string(request.if_none_match)}](
                          std::string_view bytes) {

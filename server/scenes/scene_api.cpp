@@ -1,7 +1,6 @@
 #include "server/scenes/scene_api.h"
 
 #include <algorithm>
-#include <array>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -12,16 +11,6 @@
 
 namespace catgs {
 namespace {
-
-constexpr std::string_view sidecar_part = "/sidecar", films_part = "/films";
-
-/// The scene whose sidecar a PUT saves, or of which it orders a film.
-std::optional<std::string_view> author_scene_of(std::string_view path) {
-  const auto saved = scene_of(path, sidecar_part);
-  return saved ? saved : scene_of(path, films_part);
-}
-
-constexpr std::array<std::string_view, 3> part_names = {"/tours", "/poster.jpg", "/walk"};
 
 /// Builds the answer to "GET /api/scenes".
 std::shared_ptr<const std::string> scene_list(
@@ -40,14 +29,6 @@ std::shared_ptr<const std::string> scene_list(
 }
 
 }  // namespace
-
-std::optional<HttpResponse> SceneApi::respond(const HttpRequest& request) {
-  if (request.path == "/api/scenes") return list_scenes(permit_of(authorize_, request));
-  for (const Part part : {Part::tours, Part::poster, Part::walk})
-    if (const auto id = scene_of(request.path, part_names[static_cast<std::size_t>(part)]))
-      return part_of_scene(scenes_.resolve(*id), part, request);
-  return std::nullopt;
-}
 
 /// Only for scenes that are shown without a token. Programs that make previews have no token, and a
 /// preview must not reveal more than the page.
@@ -68,7 +49,8 @@ std::string SceneApi::preview(const HttpRequest& request) {
 
 /// Lists the scenes that the permit allows. Like hello, the list tells strangers nothing about
 /// other scenes.
-HttpResponse SceneApi::list_scenes(const Permit& permit) {
+HttpResponse SceneApi::list(const HttpRequest& request) {
+  const Permit permit = permit_of(authorize_, request);
   const auto listing = scenes_.listing();
   std::vector<const SceneLibrary::Listing*> shown;
   Refusal refusal = listing->empty() ? permit.refusal({}, Use::list) : std::nullopt;
@@ -87,33 +69,44 @@ HttpResponse SceneApi::list_scenes(const Permit& permit) {
   return json_response(whole_list_);
 }
 
-HttpResponse SceneApi::part_of_scene(std::string_view scene_id, Part part,
-                                     const HttpRequest& request) {
-  const Permit permit = permit_of(authorize_, request);
-  if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
+template <typename Answer>
+HttpResponse SceneApi::about(std::string_view scene_id, const Answer& answer) {
   const auto listing = scenes_.listing();
   const auto found = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
   if (found == listing->end()) return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
-  if (part == Part::tours) {
+  return answer(*found);
+}
+
+HttpResponse SceneApi::tours(std::string_view scene_id, const Permit& permit) {
+  return about(scene_id, [&](const SceneLibrary::Listing& scene) {
     static const ToursAnswers none;
-    const ToursAnswers& tours = found->tours ? *found->tours : none;
+    const ToursAnswers& tours = scene.tours ? *scene.tours : none;
     return json_response(permit.allows(scene_id, Use::save) ? tours.for_authors
                                                             : tours.for_viewers);
-  }
-  if (part == Part::walk) return ground_of(*found, request.if_none_match);
-  if (!found->poster) {
-    if (found->loaded) return text_response(404, "404: the scene has no poster\n");
-    scenes_.want_poster(found->id);
-    // No error: browsers would report that to visitors who look at the console.
-    HttpResponse later = text_response(202, "202: the poster comes when the scene is loaded\n");
-    later.retry_after_s = 5;
-    return later;
-  }
-  HttpResponse response;
-  response.content_type = "image/jpeg";
-  response.cache_control = "private, max-age=60";
-  response.body = found->poster;
-  return response;
+  });
+}
+
+HttpResponse SceneApi::poster(std::string_view scene_id) {
+  return about(scene_id, [&](const SceneLibrary::Listing& scene) {
+    HttpResponse response;
+    if (!scene.poster && scene.loaded) return text_response(404, "404: the scene has no poster\n");
+    if (!scene.poster) {
+      scenes_.want_poster(scene.id);
+      // No error: browsers would report that to visitors who look at the console.
+      response = text_response(202, "202: the poster comes when the scene is loaded\n");
+      response.retry_after_s = 5;
+      return response;
+    }
+    response.content_type = "image/jpeg";
+    response.cache_control = "private, max-age=60";
+    response.body = scene.poster;
+    return response;
+  });
+}
+
+HttpResponse SceneApi::walkable_area(std::string_view scene_id, std::string_view if_none_match) {
+  return about(scene_id,
+               [&](const SceneLibrary::Listing& scene) { return ground_of(scene, if_none_match); });
 }
 
 /// Neither a search that goes on nor a scene without ground is an error, which browsers would
@@ -145,26 +138,6 @@ HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
   else
     response.body = scene.ground->file;
   return response;
-}
-
-std::optional<HttpResponse> SceneApi::refuse_upload(const HttpRequest& request) {
-  const auto wish = author_scene_of(request.path);
-  if (!wish)
-    return text_response(
-        405, "405: only sidecars and media of scenes, and orders of films, are taken here\n");
-  return refuse_change(scenes_, permit_of(authorize_, request), scenes_.resolve(*wish));
-}
-
-std::string SceneApi::saved_scene(const HttpRequest& request) const {
-  return scenes_.resolve(author_scene_of(request.path).value());
-}
-
-std::string SceneApi::author_of(const HttpRequest& request) const {
-  return permit_of(authorize_, request).token_id;
-}
-
-bool SceneApi::orders_film(const HttpRequest& request) {
-  return scene_of(request.path, films_part).has_value();
 }
 
 }  // namespace catgs

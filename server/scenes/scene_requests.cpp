@@ -26,11 +26,12 @@ HttpResponse unauthorized(std::string_view why) {
   return text_response(401, fmt::format("401: {}\nSend it as Authorization: Bearer TOKEN\n", why));
 }
 
-std::optional<HttpResponse> refuse_change(const SceneLibrary& scenes, const Permit& permit,
-                                          std::string_view scene_id) {
+std::optional<HttpResponse> refuse_use(const SceneLibrary& scenes, const Permit& permit,
+                                       std::string_view scene_id, Use use) {
   if (const auto refused = permit.refusal(scene_id, Use::list)) return unauthorized(*refused);
-  if (const auto refused = permit.refusal(scene_id, Use::save))
+  if (const auto refused = permit.refusal(scene_id, use))
     return text_response(403, "403: " + *refused + "\n");
+  if (use != Use::save) return std::nullopt;
   if (std::ranges::count(*scenes.listing(), scene_id, &SceneLibrary::Listing::id) == 0)
     return text_response(404, "404: " + no_such_scene(scene_id) + "\n");
   return std::nullopt;

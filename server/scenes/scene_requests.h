@@ -19,9 +19,9 @@ HttpResponse json_response(std::shared_ptr<const std::string> body);
 /// Status 401. `why`: the refusal of a permit.
 HttpResponse unauthorized(std::string_view why);
 
-/// The answer to a request to change files of a scene that is not there, or by somebody who may not
-/// save; nothing: go on.
-std::optional<HttpResponse> refuse_change(const SceneLibrary& scenes, const Permit& permit,
-                                          std::string_view scene_id);
+/// Refuses a request to use a scene by a permit that does not allow that, or to save a scene that
+/// is not there; nothing: go on.
+std::optional<HttpResponse> refuse_use(const SceneLibrary& scenes, const Permit& permit,
+                                       std::string_view scene_id, Use use);
 
 }  // namespace catgs

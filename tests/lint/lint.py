@@ -126,9 +126,7 @@ BANNED_CALLS = [
 MAX_LINES = 450
 MAX_IMPORTS = 20
 # A ratchet: these may shrink, never grow, and leave the list when they meet the limit.
-MORE_IMPORTS = {
-    "server/server.cpp": 27,
-}
+MORE_IMPORTS: dict[str, int] = {}
 
 # Folders whose English is plain. Others follow.
 PLAIN = re.compile(r"^(render_core|tests/(render_core|load|fuzz|bench|support))/")

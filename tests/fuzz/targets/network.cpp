@@ -4,12 +4,15 @@
 #include <regex>
 #include <variant>
 
+#include <fmt/format.h>
+
 #include "proto/catgs.pb.h"
 #include "server/access/access.h"
 #include "server/access/session_tokens.h"
 #include "server/access/signed_token.h"
 #include "server/media/media_type.h"
 #include "server/net/http.h"
+#include "server/net/path_pattern.h"
 #include "server/net/static_files.h"
 #include "server/net/trusted_proxies.h"
 #include "server/net/wire.h"
@@ -241,11 +244,12 @@ void parse_request(Bytes input) {
               client.find('%') != std::string::npos,
           "clients have addresses");
   check_precondition({if_match, if_none_match});
-  const auto scene = scene_of(path, "/tours");
-  if (scene)
-    require(path == "/api/scenes/" + std::string(*scene) + "/tours" && !scene->empty(),
-            "a path names one scene");
-  check_preview(title, std::string(scene.value_or(path)));
+  const auto parts = match_path("/api/scenes/{scene...}/media/{name?}", path);
+  if (parts)
+    require(path == fmt::format("/api/scenes/{}/media/{}", (*parts)[0], (*parts)[1]) &&
+                !(*parts)[0].empty() && (*parts)[1].find('/') == std::string_view::npos,
+            "a path names one scene and one file");
+  check_preview(title, std::string(parts ? (*parts)[0] : path));
   if (page.status == 404 && forwarded.empty() && host.empty())
     throw InputError("request", "", "nothing in it");
 }
@@ -254,7 +258,7 @@ std::map<std::string, std::string> request_seeds() {
   return {{"page", "/\nlocalhost:8080\nhttp://localhost:8080\n198.51.100.1"},
           {"asset", "/assets/a.js\n[::1]:8080\nhttps://friend.example\n198.51.100.1, 10.1.2.3"},
           {"climb", "/assets/../../secret\n127.0.0.1\nnull\n[2001:db8::1]:4711,10.0.0.2:80"},
-          {"upload", "/api/scenes/a b/tours\nlocalhost\n\n\n\"x\", " + etag_of("a tour") +
+          {"upload", "/api/scenes/a b/media/c.jpg\nlocalhost\n\n\n\"x\", " + etag_of("a tour") +
                          "\n*\nThe \"Old\" <Town> & 'Port'"}};
 }
 

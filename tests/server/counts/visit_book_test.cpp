@@ -5,6 +5,8 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <memory>
 #include <thread>
 
@@ -47,12 +49,10 @@ class VisitBookTest : public testing::Test {
   VisitsPage page_of(const VisitBook& book) {
     return {book, [this] { return now_s_.load(); }, [this](const auto&) { return titles_; }};
   }
-  static HttpResponse ask(const VisitsPage& page, const std::string& path,
-                          std::vector<std::string> arguments = {}) {
+  static HttpResponse charts(const VisitsPage& page, std::vector<std::string> arguments) {
     HttpRequest request;
-    request.path = path;
     request.arguments = std::move(arguments);
-    return page.respond(request).value_or(text_response(404, ""));
+    return page.charts(request);
   }
   static std::string rest_of(const HttpResponse& response) {
     std::string text;
@@ -235,7 +235,7 @@ TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
   titles_ = std::make_shared<const std::vector<TourTitles>>(
       std::vector<TourTitles>{{"The <house>", {"Gate & door"}}});
   const auto summary = [&](std::vector<std::string> arguments) {
-    return nlohmann::json::parse(rest_of(ask(pages, "/visits.json", std::move(arguments))));
+    return nlohmann::json::parse(rest_of(charts(pages, std::move(arguments))));
   };
   const auto rows_of = [](const nlohmann::json& part) { return part.at("table").at("rows"); };
   const auto all = summary({});
@@ -252,7 +252,6 @@ TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
   EXPECT_EQ(rows_of(one.at("parts").at(2)).dump(),
             R"([["The <house>","Gate & door",1],["The <house>","stop 8",1]])");
   EXPECT_EQ(summary({"days=-5"}).at("title"), "Visits: all scenes, 1 days");
-  EXPECT_EQ(ask(pages, "/visit").status, 404);
 }
 
 TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
@@ -260,10 +259,10 @@ TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
   const VisitsPage pages = page_of(book);
   counts_.visit("=1+\"1\"", DeviceKind::desktop);
   counts_.reach("=1+\"1\"", {0, 0});
-  EXPECT_EQ(rest_of(ask(pages, "/visits.csv")),
+  EXPECT_EQ(rest_of(pages.visits_csv()),
             "date,scene,visits,seconds,bytes,unknown,desktop,phone,tablet,headset\r\n"
             "2025-11-25,\"'=1+\"\"1\"\"\",1,0,0,0,1,0,0,0\r\n");
-  EXPECT_THAT(rest_of(ask(pages, "/visits/stops.csv")),
+  EXPECT_THAT(rest_of(pages.stops_csv()),
               HasSubstr("2025-11-25,\"'=1+\"\"1\"\"\",1,1,\"tour 1\",\"stop 1\",1\r\n"));
 }
 
@@ -274,21 +273,24 @@ TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
   };
   const VisitBook book(folder_.path(), counts_);
   const VisitsPage pages = page_of(book);
-  for (const char* path : {"/visits.json", "/visits.csv", "/visits/stops.csv"}) {
+  const std::map<std::string, std::function<HttpResponse()>> documents = {
+      {"charts", [&] { return charts(pages, {"days=4"}); }},
+      {"visits", [&] { return pages.visits_csv(); }},
+      {"stops", [&] { return pages.stops_csv(); }}};
+  for (const auto& [name, document] : documents) {
     for (const char* date : {"2025-11-22", "2025-11-23", "2025-11-24"}) write(date, "before");
-    const HttpResponse response = ask(pages, path, {"days=4"});
+    const HttpResponse response = document();
     ASSERT_EQ(response.body, nullptr);
     write("2025-11-22", "changed_1");
     std::string text = response.next_piece().value();
-    if (std::string(path) != "/visits.json")
-      text += response.next_piece().value();  // after its head
+    if (name != "charts") text += response.next_piece().value();  // after its head
     write("2025-11-23", "changed_2");
     text += response.next_piece().value();
     write("2025-11-24", "changed_3");
     text += rest_of(response);
     EXPECT_THAT(text, AllOf(HasSubstr("changed_1"), HasSubstr("changed_2"), HasSubstr("changed_3"),
                             Not(HasSubstr("before"))))
-        << path;
+        << name;
   }
 }
 
@@ -297,7 +299,7 @@ TEST_F(VisitBookTest, PiecesOfALongPageHaveALargestSize) {
   for (std::uint32_t i = 0; i < VisitCounts::most_stops; ++i)
     counts_.reach("hall", {i / 256, i % 256});
   const VisitsPage pages = page_of(book);
-  const HttpResponse response = ask(pages, "/visits/stops.csv");
+  const HttpResponse response = pages.stops_csv();
   std::size_t bytes = 0, pieces = 0;
   while (const auto piece = response.next_piece()) {
     EXPECT_LE(piece->size(), 64u * 1024u);

@@ -54,8 +54,9 @@ class FilmStudioTest : public testing::Test {
     auto answer = studio->order("hall", "ada", json, std::make_shared<UploadPlace>());
     return nlohmann::json::parse(*answer.get().body).at("id");
   }
-  HttpResponse get(const std::string& path) { return *studio->respond({"/api/films/" + path, {}}); }
-  nlohmann::json report(const std::string& job) { return nlohmann::json::parse(*get(job).body); }
+  nlohmann::json report(const std::string& job) {
+    return nlohmann::json::parse(*studio->report(job).body);
+  }
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 20'000 && !holds(); ++i) {
       io.restart();
@@ -101,7 +102,7 @@ TEST_F(FilmStudioTest, JobLetsGoOfItsSceneAndTakesItAgain) {
   EXPECT_EQ(report(job).at("state"), "drawing");
   there = true;
   run_until([&] { return report(job).at("state") == "done"; });
-  EXPECT_EQ(get(job + "/file").content_type, "video/mp4");
+  EXPECT_EQ(studio->result(job).content_type, "video/mp4");
   EXPECT_EQ(leases->held, 0);
 }
 
@@ -130,7 +131,7 @@ TEST_F(FilmStudioTest, JobThatWaitsForItsSceneCanBeCancelled) {
   start();
   const std::string job = begin();
   take_the_memory();
-  EXPECT_EQ(studio->cancel({"/api/films/" + job + "/cancel", {}}).get().status, 200);
+  EXPECT_EQ(studio->cancel(job).status, 200);
   there = true;
   const std::string next = order(film_of(2));
   run_until([&] { return report(next).at("state") == "done"; });
@@ -140,12 +141,12 @@ TEST_F(FilmStudioTest, RevokedLinkHasNoResultAndNoJob) {
   start();
   const std::string done = order(film_of(2));
   run_until([&] { return report(done).at("state") == "done"; });
-  EXPECT_EQ(get(done + "/file").status, 200);
+  EXPECT_EQ(studio->result(done).status, 200);
   const std::string drawn = begin();
   revoked = "ada";
-  EXPECT_EQ(get(done).status, 404);
-  EXPECT_EQ(get(done + "/file").status, 404);
-  EXPECT_TRUE(studio->refuse_cancel({"/api/films/" + drawn + "/cancel", {}}));
+  EXPECT_EQ(studio->report(done).status, 404);
+  EXPECT_EQ(studio->result(done).status, 404);
+  EXPECT_TRUE(studio->refuse_cancel(drawn));
   run_until([&] { return leases->held == 0; });
   revoked = "";
   EXPECT_EQ(report(drawn).at("state"), "cancelled");

@@ -1,6 +1,7 @@
 // Integration: authors order pictures and films. Real sockets on loopback, a whole server in this
 // process.
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -22,7 +23,9 @@
 namespace catgs::test {
 namespace {
 
+using namespace std::chrono_literals;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 constexpr auto picture =
     R"({"kind": "picture", "size": [64, 48], "views": [[0, 0, -5, 0, 0, 0, 1, 60]]})";
@@ -99,6 +102,25 @@ TEST_F(Films, AreCancelledByWhoKnowsTheirJob) {
   EXPECT_EQ(cancel(job), 200);
   EXPECT_EQ(report(job).at("state"), "cancelled");
   EXPECT_EQ(order(picture, token("author")).status, 202);
+}
+
+TEST_F(Films, DeleteCancelsTheJob) {
+  const std::string job = "/api/films/" + job_of(order(film, token("author")));
+  const auto send_delete = [&](const std::string& path, const std::string& headers = "") {
+    RawSocket socket(server->port());
+    socket.send("DELETE " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n");
+    return socket.receive(20s);
+  };
+  const auto state = [&] {
+    return nlohmann::json::parse(http_get(server->port(), job).body).at("state");
+  };
+  EXPECT_THAT(send_delete(job, "Origin: https://evil.example\r\n"), StartsWith("HTTP/1.1 403 "));
+  EXPECT_THAT(send_delete(job, "Content-Length: 1\r\n"), StartsWith("HTTP/1.1 413 "));
+  EXPECT_NE(state(), "cancelled");
+  EXPECT_THAT(send_delete(job, "Content-Length: 0\r\n"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_EQ(state(), "cancelled");
+  EXPECT_THAT(send_delete(job), StartsWith("HTTP/1.1 404 ")) << "it has ended";
+  EXPECT_THAT(send_delete(job + "/file"), StartsWith("HTTP/1.1 405 "));
 }
 
 TEST_F(Films, OfStrangersAreUnknownAndTakeNoPlace) {
