@@ -67,7 +67,8 @@ TEST(FilmWish, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 0, 60]")), HasSubstr("views[0]: is no quaternion"));
   EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1.02, 60]")), HasSubstr("is no quaternion"));
   EXPECT_THAT(mistake(film("[1, 2, 3, 0, 0, 0, 1, 170]")), HasSubstr("field of view"));
-  EXPECT_THAT(mistake(film("[1, 2, 3e9, 0, 0, 0, 1, 60]")), HasSubstr("views[0]: is not a position"));
+  EXPECT_THAT(mistake(film("[1, 2, 3e9, 0, 0, 0, 1, 60]")),
+              HasSubstr("views[0]: is not a position"));
   EXPECT_THAT(mistake(film("[1, 2, \"x\", 0, 0, 0, 1, 60]")), HasSubstr("views[0][2]"));
   EXPECT_THAT(mistake(film(view + ", 1.5")), HasSubstr("views[1]"));
   EXPECT_THAT(mistake(film(view + ", -1")), HasSubstr("views[1]"));
