@@ -85,7 +85,8 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       tally_(around.counts),
       pings_(2.0, 2.0, Clock::now()),
       preparations_(0.1, 3.0, Clock::now()),
-      shared_tours_(2.0, 8.0, Clock::now()) {}
+      shared_tours_(2.0, 8.0, Clock::now()),
+      refusals_(1.0, 1.0, Clock::now()) {}
 
 Place::~Place() { executor_->close(std::move(stream_)); }
 
@@ -100,7 +101,7 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   if (visit_.life().state() == VisitState::live) {
     if (begins_shared_tour(message, audience_.presentation().since().has_value()) &&
         !shared_tours_.take(received))
-      return refuse_shared_tour(visit_, message, received);
+      return refusals_.take(received) ? refuse_shared_tour(visit_, message, received) : void();
     if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
     if (const auto* wish = std::get_if<Follow>(&message))
       return admissions_.follow(*this, from, *wish, received);

@@ -115,6 +115,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   Audience audience_;
   VisitTally tally_;
   RateLimit pings_, preparations_, shared_tours_;
+  RateLimit refusals_;  // that are told: a flood costs neither answers nor lines of the log
 };
 
 /// Returns null if no place has this id.

@@ -40,7 +40,10 @@ class OpenConnection final : public Connection {
       throw std::logic_error("no ServerMessage");
     if (parsed.has_welcome()) welcome = parsed.welcome();
     if (parsed.has_config()) config = parsed.config();
-    if (parsed.has_error()) error = parsed.error();
+    if (parsed.has_error()) {
+      error = parsed.error();
+      ++errors;
+    }
     if (parsed.has_heartbeat()) ++heartbeats;
     if (parsed.has_lead()) lead = parsed.lead();
     if (parsed.has_pinged()) pinged.push_back(parsed.pinged());
@@ -60,6 +63,7 @@ class OpenConnection final : public Connection {
   std::optional<v1::Welcome> welcome;
   std::optional<v1::StreamConfig> config;  // after that of the welcome
   std::optional<v1::Error> error;
+  int errors = 0;
   std::optional<CloseCode> closed;
   bool waits = false;
   std::uint32_t estimate_s = 0;  // of a wait

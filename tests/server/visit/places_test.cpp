@@ -222,6 +222,8 @@ TEST_F(CompanyTest, SharedTourBeginsAFewTimesASecondAtMost) {
     EXPECT_EQ(visitor.connection->error->code(), v1::Error::RATE_LIMITED);
     EXPECT_FALSE(visitor.connection->error->fatal());
     EXPECT_FALSE(visitor.connection->closed);
+    run_for(100ms);
+    EXPECT_LT(visitor.connection->errors, 10) << "a flood is not answered message by message";
   };
   flood(*follower, follows);
   EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
