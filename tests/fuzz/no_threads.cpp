@@ -5,6 +5,8 @@
 
 namespace catgs {
 
+int processors() { return 1; }
+
 ThreadPool::ThreadPool(int /*threads*/) : threads_(1) {}
 ThreadPool::~ThreadPool() = default;
 
