@@ -93,12 +93,13 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
 
 TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
   const auto answer = [](int fast, int all, double sum_s, int frames, int sessions) {
-    return nlohmann::json{{"catgs_stage_seconds",
-                           {{{"labels", {{"stage", "wait"}}},
-                             {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
-                             {"sum", sum_s}}}},
-                          {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
-                          {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}}};
+    return nlohmann::ordered_json{
+        {"catgs_stage_seconds",
+         {{{"labels", {{"stage", "wait"}}},
+           {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
+           {"sum", sum_s}}}},
+        {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
+        {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}}};
   };
   const auto before = answer(100, 100, 1.0, 7, 3), after = answer(150, 200, 1.5, 17, 4);
   const Metrics change = change_between(before, after, "server.");
