@@ -82,10 +82,10 @@ std::vector<prometheus::MetricFamily> Metrics::families() const {
 std::string Metrics::scrape() const { return prometheus::TextSerializer().Serialize(families()); }
 
 std::string Metrics::json() const {
-  nlohmann::json all;
+  nlohmann::ordered_json all;
   for (const prometheus::MetricFamily& family : families())
     for (const prometheus::ClientMetric& metric : family.metric) {
-      nlohmann::json series{{"labels", nlohmann::json::object()}};
+      nlohmann::ordered_json series{{"labels", nlohmann::ordered_json::object()}};
       for (const auto& label : metric.label) series["labels"][label.name] = label.value;
       if (family.type == prometheus::MetricType::Histogram) {
         series["sum"] = metric.histogram.sample_sum;

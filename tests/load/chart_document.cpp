@@ -42,10 +42,18 @@ Json requirement_table(const Outcome& outcome) {
 
 Json group_table(const RunReport& report, const HoldBounds& bounds) {
   Json columns = Json::array({"group"}), rows = Json::array();
-  constexpr std::array names = {
-      "sessions_connected",   "fps_min",      "fps_mean",        "fps_max",
-      "bitrate_kbps_mean",    "psnr_mean_db", "sessions_held",   "pose_to_frame_p50_ms",
-      "pose_to_frame_p95_ms", "errors",       "pose_age_p95_ms", "pose_to_frame_p99_ms"};
+  constexpr std::array names = {"sessions_connected",
+                                "fps_min",
+                                "fps_mean",
+                                "fps_max",
+                                "bitrate_kbps_mean",
+                                "pose_to_frame_p50_ms",
+                                "pose_to_frame_p95_ms",
+                                "pose_to_frame_p99_ms",
+                                "pose_age_p95_ms",
+                                "psnr_mean_db",
+                                "sessions_held",
+                                "errors"};
   for (const char* name : names) columns.push_back(name);
   for (const GroupReport& group : report.groups) {
     const Metrics metrics = collect_metrics(group.sessions, group.nominal_fps, bounds);

@@ -93,12 +93,14 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
 
 TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
   const auto answer = [](int fast, int all, double sum_s, int frames, int sessions) {
-    return nlohmann::json{{"catgs_stage_seconds",
-                           {{{"labels", {{"stage", "wait"}}},
-                             {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
-                             {"sum", sum_s}}}},
-                          {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
-                          {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}}};
+    return nlohmann::ordered_json{
+        {"catgs_stage_seconds",
+         {{{"labels", {{"stage", "wait"}}},
+           {"buckets", {{0.001, fast}, {0.01, all}, {nullptr, all}}},
+           {"sum", sum_s}}}},
+        {"catgs_frames_total", {{{"labels", nullptr}, {"value", frames}}}},
+        {"catgs_sessions", {{{"labels", nullptr}, {"value", sessions}}}},
+        {"catgs_scene_pages", {{{"labels", {{"scene", "city"}, {"device", "1"}}}, {"value", 7}}}}};
   };
   const auto before = answer(100, 100, 1.0, 7, 3), after = answer(150, 200, 1.5, 17, 4);
   const Metrics change = change_between(before, after, "server.");
@@ -107,6 +109,7 @@ TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
   EXPECT_DOUBLE_EQ(value_of(change, "server.stage_wait_mean_ms"), 5.0);
   EXPECT_DOUBLE_EQ(value_of(change, "server.frames_total"), 10.0);
   EXPECT_DOUBLE_EQ(value_of(change, "server.sessions"), 4.0);
+  EXPECT_DOUBLE_EQ(value_of(change, "server.scene_pages_city_1"), 7.0);
   EXPECT_TRUE(std::isnan(value_of(change_between(after, after, ""), "stage_wait_p50_ms")));
 }
 

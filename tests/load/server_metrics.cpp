@@ -9,7 +9,7 @@
 namespace catgs::load {
 namespace {
 
-using ServerJson = nlohmann::json;
+using ServerJson = nlohmann::ordered_json;
 using Buckets = std::map<double, double>;  // upper bound in seconds, cumulative count
 
 /// JSON has null for what is no finite number.

@@ -12,7 +12,7 @@ namespace catgs::load {
 /// (interpolated within their buckets) in milliseconds, increase of counters ("…_total"), last
 /// value of gauges. A name is `prefix`, the family without "catgs_", and the values of the labels:
 /// catgs_frame_stage_seconds{stage="send"} becomes "frame_stage_send_p50_ms" and so on.
-Metrics change_between(const nlohmann::json& before, const nlohmann::json& after,
+Metrics change_between(const nlohmann::ordered_json& before, const nlohmann::ordered_json& after,
                        const std::string& prefix);
 
 }  // namespace catgs::load

@@ -133,7 +133,7 @@ void ServerProcess::signal(int number) const {
   if (pid_ > 0) ::kill(pid_, number);
 }
 
-nlohmann::json ServerProcess::server_metrics() const {
+nlohmann::ordered_json ServerProcess::server_metrics() const {
   namespace beast = boost::beast;
   namespace http = beast::http;
   try {
@@ -147,7 +147,7 @@ nlohmann::json ServerProcess::server_metrics() const {
     beast::flat_buffer buffer;
     http::response<http::string_body> response;
     http::read(stream, buffer, response);
-    return nlohmann::json::parse(response.body());
+    return nlohmann::ordered_json::parse(response.body());
   } catch (const boost::system::system_error&) {
     return {};  // a server that a scenario has ended says nothing more
   }

@@ -45,7 +45,7 @@ class ServerProcess {
  private:
   void wait_until_serving();
   void sample(const std::stop_token& stop);
-  [[nodiscard]] nlohmann::json server_metrics() const;
+  [[nodiscard]] nlohmann::ordered_json server_metrics() const;
   [[nodiscard]] std::string log_text() const;
 
   std::filesystem::path log_;
@@ -55,7 +55,7 @@ class ServerProcess {
   int admin_port_ = 0;
   std::jthread sampler_;
   std::vector<UsageSample> usage_;
-  nlohmann::json before_, after_;  // answers of /api/metrics
+  nlohmann::ordered_json before_, after_;  // answers of /api/metrics
 };
 
 }  // namespace catgs::load
