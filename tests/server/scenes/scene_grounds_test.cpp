@@ -269,7 +269,10 @@ TEST_F(SceneGroundsTest, AFailureThatPassesIsNoAnswer) {
   }
   EXPECT_EQ(listed(), nullptr);
   fs::rename(folder_ / "scenes/a.away", folder_ / "scenes/a.ply");
-  load();  // where the library has looked while the file was away
+  run_until([&] {
+    now_ += 1s;  // the library may have looked while the file was away, and looks again
+    return std::holds_alternative<Entry>(library_->want(id(), now_));
+  });
   run_until([&] {
     ask();
     now_ += 1min;  // the failure may only be known now

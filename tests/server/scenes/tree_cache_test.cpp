@@ -80,6 +80,8 @@ TEST_F(TreeCacheTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
   tree(whole);
   tree(whole + ".part");
   tree(whole + ".x9Yb2c");
+  const std::string new_file = "." + whole + ".3f0c91d29b1deb4d.new";
+  tree(new_file);
   for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
                             "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"})
     tree(other);
@@ -88,6 +90,7 @@ TEST_F(TreeCacheTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
   EXPECT_TRUE(fs::exists(trees_ / whole));
   EXPECT_FALSE(fs::exists(trees_ / (whole + ".part")));
   EXPECT_FALSE(fs::exists(trees_ / (whole + ".x9Yb2c")));
+  EXPECT_FALSE(fs::exists(trees_ / new_file));
   for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
                             "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"}) {
     EXPECT_TRUE(fs::exists(trees_ / other)) << other;
