@@ -87,8 +87,9 @@ describe('an author', () => {
     expect(visitor.errors).toEqual([]);
 
     // The page shows the server's reason for a refusal, and keeps the work.
-    const in_the_way = path.join(folder, '.mine.json.new');
-    mkdirSync(in_the_way);
+    const in_the_way = path.join(folder, 'mine.json.bak');
+    rmSync(in_the_way, { force: true });
+    mkdirSync(path.join(in_the_way, 'kept'), { recursive: true });
     await page.getByLabel('Title of stop 2').focus();
     await page.getByLabel('Caption of stop 2').fill('Changed.');
     await page.getByRole('button', { name: 'Save to the server' }).click();

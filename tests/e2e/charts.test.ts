@@ -16,7 +16,16 @@ const shown: ChartDocument = {
   facts: '2 clients',
   links: [{ text: 'CSV', href: '/visits.csv' }],
   parts: [
-    { heading: 'Clients', table: { columns: ['name', 'ms'], rows: [['<b>bold</b>', 12.3456], ['none', null]] } },
+    {
+      heading: 'Clients',
+      table: {
+        columns: ['name', 'ms'],
+        rows: [
+          ['<b>bold</b>', 12.3456],
+          ['none', null],
+        ],
+      },
+    },
     {
       heading: 'Over time',
       plots: [
@@ -28,7 +37,12 @@ const shown: ChartDocument = {
             { name: 'bound', x: [0, 2], y: [33, 33], bound: true },
           ],
         },
-        { title: 'Shares', unit: '%', x: 'log', curves: [{ name: 'first', x: [1, 10, 100], y: [1, 50, 99] }] },
+        {
+          title: 'Shares',
+          unit: '%',
+          x: 'log',
+          curves: [{ name: 'first', x: [1, 10, 100], y: [1, 50, 99] }],
+        },
         {
           title: 'Visits',
           unit: '',
@@ -44,18 +58,28 @@ const shown: ChartDocument = {
 it('draws the document inside it, without a server and without anything from elsewhere', async () => {
   mkdirSync(artefacts, { recursive: true });
   const file = path.join(artefacts, 'charts.html');
-  writeFileSync(file, page_text.replace('id="document">', () => `id="document">${JSON.stringify(shown)}`));
+  writeFileSync(
+    file,
+    page_text.replace('id="document">', () => `id="document">${JSON.stringify(shown)}`),
+  );
   const { page, errors } = await new_page({ viewport: { width: 1000, height: 900 } });
   const requests: string[] = [];
   page.on('request', (request) => requests.push(request.url()));
   await page.goto(pathToFileURL(file).href);
   await expect.poll(() => page.locator('canvas').count()).toBe(3);
-  expect(await page.locator('.wide td').allTextContents()).toEqual(['<b>bold</b>', '12.35', 'none', '–']);
+  expect(await page.locator('.wide td').allTextContents()).toEqual([
+    '<b>bold</b>',
+    '12.35',
+    'none',
+    '–',
+  ]);
   expect(await page.locator('nav a').getAttribute('href')).toBe('/visits.csv');
   const drawn = await page.locator('canvas').evaluateAll((all) =>
     all.map((canvas) => {
       const { width, height } = canvas as HTMLCanvasElement;
-      const pixels = (canvas as HTMLCanvasElement).getContext('2d')!.getImageData(0, 0, width, height).data;
+      const pixels = (canvas as HTMLCanvasElement)
+        .getContext('2d')!
+        .getImageData(0, 0, width, height).data;
       const blue = [0x2a, 0x78, 0xd6]; // the first curve's colour
       return pixels.some((_, i) => i % 4 === 0 && blue.every((c, k) => pixels[i + k] === c));
     }),
