@@ -176,53 +176,52 @@ TEST_F(VisitBookTest, ADayThatCannotBeWrittenWaits) {
 /// Several visits go on while the clock passes midnight and is set back, and days are written and
 /// read all the time.
 TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
-  constexpr int visitors = 3, rounds = 2000;
+  constexpr int visitors = 3, enough = 500;
   constexpr std::int64_t midnight = noon + day_s / 2;
   std::array<std::atomic<int>, 2> surely{};  // visits that began and ended on one day
-  std::atomic<int> going{visitors};
-  std::atomic<bool> grows{true};
+  std::atomic<std::uint64_t> all{0};
+  std::atomic<bool> ended{false}, grows{true};
   {
     const VisitBook book(folder_.path(), counts_, 1ms);
-    const auto visit = [&](int visitor) {
+    const auto visit = [&](std::uint32_t visitor) {
       TimePoint now = TimePoint{} + 1h;
-      for (int i = 0; i < rounds; ++i) {
+      for (std::uint32_t i = 0; !ended; ++i, ++all) {
         const bool before = now_s_ < midnight;
         VisitTally tally(&counts_);
         tally.on_show("hall", DeviceKind::desktop, 0, now);
         if (before == (now_s_ < midnight)) ++surely[before ? 0 : 1];
         tally.on_show("hall", DeviceKind::desktop, 10, now += 1s);
-        tally.reached("hall", DeviceKind::desktop,
-                      {static_cast<std::uint32_t>(visitor), static_cast<std::uint32_t>(i % 200)});
+        tally.reached("hall", DeviceKind::desktop, {visitor, i % 200});
       }
-      --going;
     };
     std::vector<std::thread> threads;
-    for (int i = 0; i < visitors; ++i) threads.emplace_back(visit, i);
+    for (std::uint32_t i = 0; i < visitors; ++i) threads.emplace_back(visit, i);
     threads.emplace_back([&] {
-      std::uint64_t seen = 0;
-      while (going > 0) {
+      for (std::uint64_t seen = 0; !ended;) {
         const DayCounts day = book.day("2025-11-26");
         const std::uint64_t now = day.empty() ? 0 : day.at("hall").visits;
         if (now < seen) grows = false;
         seen = now;
       }
     });
-    for (std::int64_t i = 0; going > 0; ++i) now_s_ = midnight - 5 + i % 10;
+    for (std::int64_t i = 0; surely[0] < enough || surely[1] < enough; ++i)
+      now_s_ = midnight - 5 + i % 10;
+    ended = true;
     for (std::thread& thread : threads) thread.join();
   }
   EXPECT_TRUE(grows) << "a day lost visits for a while";
   const VisitBook book(folder_.path(), counts_);
   ASSERT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
   const SceneCounts before = book.day(today).at("hall"), after = book.day("2025-11-26").at("hall");
-  EXPECT_EQ(before.visits + after.visits, static_cast<std::uint64_t>(visitors * rounds));
+  EXPECT_EQ(before.visits + after.visits, all);
   EXPECT_GE(before.visits, static_cast<std::uint64_t>(surely[0]));
   EXPECT_GE(after.visits, static_cast<std::uint64_t>(surely[1]));
-  EXPECT_DOUBLE_EQ(before.seconds + after.seconds, visitors * rounds);
-  EXPECT_EQ(before.bytes + after.bytes, 10u * visitors * rounds);
+  EXPECT_DOUBLE_EQ(before.seconds + after.seconds, static_cast<double>(all));
+  EXPECT_EQ(before.bytes + after.bytes, 10 * all);
   std::uint64_t stops = 0;
   for (const SceneCounts* day : {&before, &after})
     for (const auto& [stop, visits] : day->stops) stops += visits;
-  EXPECT_EQ(stops, static_cast<std::uint64_t>(visitors * rounds));
+  EXPECT_EQ(stops, all);
 }
 
 TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
