@@ -36,6 +36,7 @@ class Misdeed(NamedTuple):
     times: int = 1  # on one connection after the other
     drips: bool = False  # sends a byte more at each look
     sips: int = 0  # takes so many bytes at each look; 0: all
+    lines: int = 1  # so many of `line`
 
 
 def request(method: str, path: str = "/", headers: str = "", body: str = "", host: str = "localhost") -> bytes:

@@ -257,12 +257,12 @@ class StrangersTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             for says, errors in (("", []), ("is wrong", ["stranger, act: is wrong"])):
                 crowd = strangers.Strangers("ws://127.0.0.1:1", pathlib.Path(folder) / "misdeeds.txt", [],
-                                            acts=[acts.Act("act", lambda _, says=says: says)])
+                                            acts=[acts.Act("act", lambda _, says=says: says, "a line", 3)])
                 crowd.stopped.set()
                 with crowd:
                     pass
                 self.assertEqual(crowd.errors(), errors)
-            self.assertEqual(crowd.done(), {"act": 2})
+            self.assertEqual((crowd.done(), crowd.lines()), ({"act": 2}, {"a line": 6}))
 
     def test_misdeeds_have_names_of_their_own(self):
         for link in ("", "a link"):

@@ -95,17 +95,18 @@ class Strangers:
 
     def lines(self) -> collections.Counter[str]:
         """That they make in the log."""
-        return self._effects(lambda misdeed: (misdeed.line,) if misdeed.line else ())
+        return self._effects(lambda misdeed: (misdeed.line,) * misdeed.lines if misdeed.line else ())
 
     def moves(self) -> collections.Counter[str]:
         """What they add to counters."""
         return self._effects(lambda misdeed: misdeed.moves)
 
-    def _effects(self, of: Callable[[Misdeed], tuple[str, ...]]) -> collections.Counter[str]:
+    def _effects(self, of: Callable[[Misdeed | Act], tuple[str, ...]]) -> collections.Counter[str]:
         done = self.done()
         effects: collections.Counter[str] = collections.Counter()
-        for misdeed in self.misdeeds:
-            effects.update({effect: done.get(misdeed.name, 0) for effect in of(misdeed)})
+        for misdeed in [*self.misdeeds, *self.acts]:
+            for effect in of(misdeed):
+                effects[effect] += done.get(misdeed.name, 0)
         return effects
 
     def _go_round(self) -> None:
