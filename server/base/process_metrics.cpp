@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -64,6 +65,9 @@ std::vector<prometheus::MetricFamily> process_metrics() {
     families.push_back(
         family("process_resident_memory_bytes", "Resident memory", MetricType::Gauge,
                static_cast<double>(*pages) * static_cast<double>(sysconf(_SC_PAGESIZE))));
+  const auto heap = ::mallinfo2();
+  families.push_back(family("process_heap_bytes", "Memory that the C library has given out",
+                            MetricType::Gauge, static_cast<double>(heap.uordblks + heap.hblkhd)));
   std::error_code error;
   using Folder = std::filesystem::directory_iterator;
   const Folder descriptors("/proc/self/fd", error);

@@ -24,6 +24,7 @@ class Act(NamedTuple):
     act: Callable[[Address], str]  # says what was wrong; empty: nothing
     line: str = ""  # that it makes in the log, so often
     lines: int = 1
+    more_lines: int = 0  # that may come besides, where the server stalls
     moves: tuple[str, ...] = ()
 
 
@@ -186,11 +187,11 @@ def all_acts(link: str = "") -> list[Act]:
     """At a server that asks for no tokens, or at one where `link` is an author's."""
     stops = [field(13, field(1, i % 32) + field(2, i % 256)) for i in range(FLOOD_MESSAGES)]
     # Of those that begin, eight may come at once: shared_tours_ in server/visit/place.cpp.
-    # The others are refused once a second, so a flood that takes a moment makes at most two lines.
+    # The others are refused once a second, so a flood makes one line, and two when it is held up.
     presents = [field(11, field(1, on) + field(2, f"leader {i}")) for i in range(20) for on in (1, 0)]
     acts = [Act("forged stops", lambda address: says_and_leaves(address, link, stops)),
             Act("presents without end", lambda address: says_and_leaves(address, link, presents),
-                "127.0.0.1: shared tours begin twice a second at most: try again in a moment", 2),
+                "127.0.0.1: shared tours begin twice a second at most: try again in a moment", more_lines=1),
             Act("leads in a flood", lambda address: lead_in_a_flood(address, link))]
     if link:
         acts += [Act("two authors save", lambda address: two_authors_save(address, link)),

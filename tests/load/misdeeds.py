@@ -37,6 +37,7 @@ class Misdeed(NamedTuple):
     drips: bool = False  # sends a byte more at each look
     sips: int = 0  # takes so many bytes at each look; 0: all
     lines: int = 1  # so many of `line`
+    more_lines: int = 0  # that may come besides
 
 
 def request(method: str, path: str = "/", headers: str = "", body: str = "", host: str = "localhost") -> bytes:

@@ -27,6 +27,7 @@ class Quantity(NamedTuple):
 
 QUANTITIES = [
     Quantity("rss_mb", 2.0, 0.02),
+    Quantity("heap_mb", 2.0, 0.02),  # without what a heap keeps for itself
     Quantity("descriptors", 1.0, 0.0),
     Quantity("threads", 1.0, 0.0),
     Quantity("device_mb", 16.0, 0.01),

@@ -20,7 +20,8 @@ import strangers
 
 def samples(rss_of, minutes=60.0):
     """One a second. `rss_of`: MB by seconds."""
-    return [{"at_s": 5.0 + s, "rss_mb": rss_of(s), "descriptors": 18 + int(8 * math.sin(s / 8.0)), "threads": 6}
+    return [{"at_s": 5.0 + s, "rss_mb": rss_of(s), "heap_mb": rss_of(s),
+             "descriptors": 18 + int(8 * math.sin(s / 8.0)), "threads": 6}
             for s in range(int(60 * minutes))]
 
 
@@ -82,7 +83,7 @@ class Flatness(unittest.TestCase):
         taken = samples(lambda s: 150.0)
         report = soak_report.judge(taken) | {"rounds": 3, "errors": []}
         plots = soak_report.chart_document(report, taken)["parts"][0]["plots"]
-        self.assertEqual([plot["title"] for plot in plots], ["rss_mb", "descriptors", "threads"])
+        self.assertEqual([plot["title"] for plot in plots], ["rss_mb", "heap_mb", "descriptors", "threads"])
         self.assertEqual([len(curve["x"]) for curve in plots[0]["curves"]], [len(taken), soak_report.WINDOWS])
 
     def test_too_little_is_not_flat(self):
@@ -103,7 +104,7 @@ class Findings(unittest.TestCase):
             '{"time":"t","level":"warning","message":"odd"}\n'
             "12:00:00.000 info session 1f2e3d4c: fine\n"
             "12:00:00.000 error session 1f2e3d4c: bad\n"
-            "==1==ERROR: AddressSanitizer\n", collections.Counter())
+            "==1==ERROR: AddressSanitizer\n", collections.Counter(), collections.Counter())
         self.assertEqual(bad, ['{"time":"t","level":"warning","message":"odd"}',
                                "12:00:00.000 error session 1f2e3d4c: bad", "==1==ERROR: AddressSanitizer"])
 
@@ -112,10 +113,12 @@ class Findings(unittest.TestCase):
                  "12:00:00.000 warning session 1f2e3d4c: 127.0.0.1: refused",
                  "12:00:00.000 \x1b[1;33mwarning\x1b[m 127.0.0.1 by link abe6d002dd8b: refused"]
         caused = lambda times: collections.Counter({"127.0.0.1: refused": times})
-        of = lambda times, text=lines: soak.bad_lines("\n".join(text), caused(times))
+        of = lambda times, text=lines, more=0: soak.bad_lines("\n".join(text), caused(times), caused(more))
         self.assertEqual(of(3), [])
         self.assertEqual(of(2), lines[2:], "one that nobody caused")
         self.assertEqual(of(5), ["2 lines too few: 127.0.0.1: refused"])
+        self.assertEqual((of(2, more=1), of(3, more=1)), ([], []))
+        self.assertEqual(of(1, more=1), lines[2:])
         for other in ("12:00:00.000 error 127.0.0.1: refused", "12:00:00.000 warning 127.0.0.1: refused, too"):
             self.assertEqual(of(1, [other]), [other, "1 lines too few: 127.0.0.1: refused"])
 

@@ -97,6 +97,10 @@ class Strangers:
         """That they make in the log."""
         return self._effects(lambda misdeed: (misdeed.line,) * misdeed.lines if misdeed.line else ())
 
+    def more_lines(self) -> collections.Counter[str]:
+        """That may be in the log besides."""
+        return self._effects(lambda misdeed: (misdeed.line,) * misdeed.more_lines)
+
     def moves(self) -> collections.Counter[str]:
         """What they add to counters."""
         return self._effects(lambda misdeed: misdeed.moves)
