@@ -44,10 +44,16 @@ class Flatness(unittest.TestCase):
         self.assertFalse(short["flat"], "of eighteen minutes too few are left")
         self.assertGreater(len(short["quantities"]["rss_mb"]["envelope"]), 0)
         said = {"rounds": 3, "errors": []}
-        self.assertIn("too short to judge memory by", soak_report.to_text(short | said))
+        self.assertIn("too short to judge rss_mb by", soak_report.to_text(short | said))
         long = self.judge(lambda s: 150.0 + 0.002 * s) | said
         self.assertIn("NOT FLAT", soak_report.to_text(long))
         self.assertNotIn("too short", soak_report.to_text(long))
+
+    def test_a_short_run_is_judged_by_the_use_of_the_heap(self):
+        fragments = [sample | {"heap_mb": 60.0} for sample in samples(lambda s: 150.0 + 0.02 * s, 15.0)]
+        self.assertTrue(soak_report.judge(fragments)["flat"])
+        leak = [sample | {"heap_mb": 60.0 + 0.02 * sample["at_s"]} for sample in samples(lambda s: 150.0, 15.0)]
+        self.assertFalse(soak_report.judge(leak)["flat"])
 
     def test_a_warm_up_that_is_told_is_left_out(self):
         fills = samples(lambda s: 150.0 - 60.0 * max(0.0, 1.0 - s / 600.0), 15.0)
