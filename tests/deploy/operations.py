@@ -150,7 +150,7 @@ def check_haproxy(_):
         config.write_text((DEPLOY / "haproxy/haproxy.cfg").read_text().replace("/etc/haproxy/certs/", str(certificate)))
         for name, text in (("deploy", config.read_text()), ("docker", (DOCKER / "haproxy.cfg").read_text())):
             config.write_text(text)
-            findings += run(haproxy, "-c", "-f", config)
+            findings += run(haproxy, "-dW", "-c", "-f", config)  # a warning is a finding
             findings += [f"{name}: {finding}" for finding in haproxy_crowd.findings(haproxy, config)]
     return findings
 
