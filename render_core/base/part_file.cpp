@@ -10,8 +10,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const fs::path& path, std::string_view why) {
-  throw InputError(path.string(), "", why, "does the folder exist, and is there space?");
+[[noreturn]] void fail(const fs::path& path, std::string_view why,
+                       std::string_view remedy = "does the folder exist, and is there space?") {
+  throw InputError(path.string(), "", why, remedy);
 }
 
 /// Neither a file nor a folder: a pipe or a device, which must not be replaced by a file.
@@ -33,7 +34,8 @@ fs::path without_links(const fs::path& path) {
 PartFile::PartFile(const fs::path& path, Special special) : path_(path) {
   const fs::path target = special == Special::written ? without_links(path) : path;
   std::error_code error;
-  if (fs::is_directory(target, error)) fail(path_, "is a folder");
+  if (fs::is_directory(target, error))
+    fail(path_, "is a folder", "name a file, or remove the folder");
   try {
     if (special == Special::replaced || !is_special(target)) fresh_.emplace(target);
   } catch (const std::system_error& failure) {

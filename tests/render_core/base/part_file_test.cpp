@@ -87,7 +87,8 @@ TEST_F(PartFileTest, IsTriedBeforehandWithoutATrace) {
   const fs::path nowhere = folder_ / "no/report";
   EXPECT_EQ(complaint(nowhere),
             nowhere.string() + ": cannot be written: No such file or directory" + remedy);
-  EXPECT_EQ(complaint(folder_.path()), folder_.path().string() + ": is a folder" + remedy);
+  EXPECT_EQ(complaint(folder_.path()),
+            folder_.path().string() + ": is a folder (name a file, or remove the folder)");
   EXPECT_EQ(complaint("/dev/null"), "");
 }
 
