@@ -56,6 +56,11 @@ std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_i
   return jobs_.back().id;
 }
 
+void FilmQueue::found_scene(const std::string& id, int content) {
+  const std::lock_guard lock(mutex_);
+  if (FilmJob* const job = known(id)) job->content = content;
+}
+
 std::optional<FilmJob> FilmQueue::start_next() {
   const std::lock_guard lock(mutex_);
   const auto next = std::ranges::find(jobs_, FilmState::waiting, &FilmJob::state);

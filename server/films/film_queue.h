@@ -37,6 +37,7 @@ struct FilmJob : FilmReport {
   std::string id;  // whoever knows it may ask for the result
   std::string scene_id;
   FilmWish wish;
+  std::optional<int> content{};  // of the scene, if it was in memory: SceneLease::content()
 };
 
 /// The orders of authors: one is drawn at a time, and a few wait. Results are kept for an hour,
@@ -57,6 +58,8 @@ class FilmQueue {
   };
   /// Returns the id of the job.
   std::variant<std::string, Refused> add(std::string scene_id, std::string owner, FilmWish wish);
+  /// The scene of a job that waits is in memory, so the job may wait for it when its turn comes.
+  void found_scene(const std::string& id, int content);
   /// The job to be drawn now; nothing: none waits.
   std::optional<FilmJob> start_next();
   /// So much of the job is drawn. False: it was cancelled.

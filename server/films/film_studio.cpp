@@ -69,14 +69,14 @@ HttpResponse FilmStudio::report(std::string_view id) {
   constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
   nlohmann::json report = {{"state", names[static_cast<std::size_t>(job->state)]},
                            {"share", job->share}};
-  if (const auto left = queue_.left(*job)) report["seconds_left"] = left->count();
+  if (const auto left = queue_->left(*job)) report["seconds_left"] = left->count();
   if (job->result) report["bytes"] = job->result->size();
   if (!job->error.empty()) report["error"] = job->error;
   return json_response(200, report);
 }
 
 std::optional<FilmReport> FilmStudio::find(std::string_view id) {
-  auto job = queue_.find(id);
+  auto job = queue_->find(id);
   return job && !around_.ended(job->owner) ? job : std::nullopt;
 }
 
@@ -87,7 +87,7 @@ std::optional<HttpResponse> FilmStudio::refuse_cancel(std::string_view id) {
 
 HttpResponse FilmStudio::cancel(std::string_view id) {
   if (auto refusal = refuse_cancel(id)) return *std::move(refusal);
-  return queue_.cancel(id) ? text_response(200, "cancelled\n") : no_such_job();
+  return queue_->cancel(id) ? text_response(200, "cancelled\n") : no_such_job();
 }
 
 std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string owner,
@@ -113,18 +113,22 @@ HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std
   } catch (const InputError& mistake) {
     return text_response(400, fmt::format("400: {}\n", mistake.what()));
   }
-  const auto added = queue_.add(scene_id, std::move(owner), std::move(wish));
+  const auto added = queue_->add(scene_id, std::move(owner), std::move(wish));
   if (const auto* refused = std::get_if<FilmQueue::Refused>(&added))
     return refused->has_one
                ? text_response(409, "409: you have ordered one already: wait for it or cancel it\n")
                : busy_response("503: others wait for theirs: try again in a few minutes\n");
   log_info({.event = "film_ordered", .scene = scene_id},
            "scene {}: an author ordered a film or picture", scene_id);
+  const auto& id = std::get<std::string>(added);
+  boost::asio::post(around_.io, [queue = queue_, lease = around_.lease, scene_id, id] {
+    if (const auto held = lease(scene_id, false).lease) queue->found_scene(id, held->content());
+  });
   {
     const std::lock_guard lock(mutex_);  // so that the artist does not miss it
   }
   wake_.notify_all();
-  return json_response(202, {{"id", std::get<std::string>(added)}});
+  return json_response(202, {{"id", id}});
 }
 
 void FilmStudio::work(const std::stop_token& stop) {
@@ -133,21 +137,21 @@ void FilmStudio::work(const std::stop_token& stop) {
     std::optional<FilmJob> job;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait(lock, stop, [&] { return (job = queue_.start_next()).has_value(); });
+      wake_.wait(lock, stop, [&] { return (job = queue_->start_next()).has_value(); });
     }
     if (job) draw(*job, stop);
   }
 }
 
 void FilmStudio::check(const FilmJob& job, double share, const std::stop_token& stop) {
-  if (around_.ended(job.owner)) queue_.cancel(job.id);
-  if (stop.stop_requested() || !queue_.drawn(job.id, share)) throw Cancelled();
+  if (around_.ended(job.owner)) queue_->cancel(job.id);
+  if (stop.stop_requested() || !queue_->drawn(job.id, share)) throw Cancelled();
 }
 
 void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   const TimePoint started = Clock::now();
   double done = 0.0;
-  std::optional<int> content;
+  std::optional<int> content = job.content;
   const auto take = [&] {
     const LeasedScene scene = take_scene(job, done, content, stop);
     content = scene.lease->content();
@@ -161,14 +165,14 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
       std::unique_lock lock(mutex_);
       if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
     });
-    queue_.finish(job.id, file);
+    queue_->finish(job.id, file);
   } catch (const Cancelled&) {
     return;
   } catch (const std::exception& failure) {
     log_warning({.event = "film_failed", .scene = job.scene_id}, "scene {}: no film: {}",
                 job.scene_id, failure.what());
     const bool for_authors = dynamic_cast<const NotDrawn*>(&failure) != nullptr;
-    queue_.fail(job.id, for_authors ? failure.what() : "the server failed to draw it: try again");
+    queue_->fail(job.id, for_authors ? failure.what() : "the server failed to draw it: try again");
   }
 }
 

@@ -30,7 +30,8 @@ class FilmStudio {
  public:
   struct Surroundings {
     boost::asio::io_context& io;  // runs the session thread
-    /// A hold on a scene in memory. `again`: the job had it before. Session thread.
+    /// A hold on a scene in memory. `again`: it was in memory when the job was ordered. Session
+    /// thread.
     std::function<LeasedScene(const std::string& scene_id, bool again)> lease;
     std::function<bool()> visitors_look;  // any thread
     Ended ended;                          // any thread
@@ -72,7 +73,7 @@ class FilmStudio {
   LeasedScene ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop);
 
   const Surroundings around_;
-  FilmQueue queue_;
+  const std::shared_ptr<FilmQueue> queue_ = std::make_shared<FilmQueue>();
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::jthread artist_;

@@ -50,8 +50,8 @@ class FilmStudioTest : public testing::Test {
         [] { return false; }, [this](std::string_view owner) { return owner == revoked.load(); },
         longest_wait});
   }
-  std::string order(const std::string& json) {
-    auto answer = studio->order("hall", "ada", json, std::make_shared<UploadPlace>());
+  std::string order(const std::string& json, const std::string& owner = "ada") {
+    auto answer = studio->order("hall", owner, json, std::make_shared<UploadPlace>());
     return nlohmann::json::parse(*answer.get().body).at("id");
   }
   nlohmann::json report(const std::string& job) {
@@ -135,6 +135,22 @@ TEST_F(FilmStudioTest, JobThatWaitsForItsSceneCanBeCancelled) {
   there = true;
   const std::string next = order(film_of(2));
   run_until([&] { return report(next).at("state") == "done"; });
+}
+
+TEST_F(FilmStudioTest, JobThatWaitedForOthersWaitsForItsScene) {
+  start();
+  const std::string first = begin();
+  const std::string job = order(film_of(2), "bob");
+  io.restart();
+  io.poll();
+  take_the_memory();
+  EXPECT_EQ(studio->cancel(first).status, 200);
+  run_until([&] { return report(job).at("state") != "waiting"; });
+  asked_again = false;
+  run_until([&] { return asked_again || report(job).at("state") == "failed"; });
+  there = true;
+  run_until([&] { return report(job).at("state") != "drawing"; });
+  EXPECT_EQ(report(job).at("state"), "done") << report(job);
 }
 
 TEST_F(FilmStudioTest, RevokedLinkHasNoResultAndNoJob) {
