@@ -6,6 +6,7 @@
 #include <thread>
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -68,10 +69,10 @@ FileLock own_folder(std::string_view setting, const fs::path& folder, std::strin
     remove_stale_files(folder, std::chrono::hours{0});
     return lock;
   } catch (const std::system_error& failure) {
-    const bool taken = failure.code() == std::errc::resource_unavailable_try_again;
-    refuse(taken ? "belongs to another server that runs"
-                 : "cannot be locked: " + failure.code().message(),
-           "give each server a folder of its own");
+    if (failure.code() == std::errc::resource_unavailable_try_again)
+      refuse("belongs to another server that runs", "give each server a folder of its own");
+    refuse(fmt::format("its file {} cannot be locked: {}", name, failure.code().message()),
+           "remove that file: the server makes it anew");
     throw;
   }
 }

@@ -155,6 +155,11 @@ TEST_F(VisitBookTest, AFolderServesOneServerAtATime) {
     EXPECT_THAT(refused(folder_.path()),
                 AllOf(HasSubstr("--visit-counts"), HasSubstr("another server")));
   }
+  fs::remove(folder_ / "visits.lock");
+  fs::create_directory(folder_ / "visits.lock");
+  EXPECT_THAT(refused(folder_.path()),
+              HasSubstr("its file visits.lock cannot be locked: Is a directory (remove that file"));
+  fs::remove(folder_ / "visits.lock");
   EXPECT_EQ(refused(folder_.path()), "");
   std::ofstream(folder_ / "file") << "";
   EXPECT_THAT(refused(folder_ / "file"), AllOf(HasSubstr("--visit-counts"), HasSubstr("file")));
