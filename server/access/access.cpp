@@ -146,7 +146,13 @@ AccessControl::AccessControl(std::filesystem::path token_file,
       revoked_file_("--revoked-links", std::move(revoked_links)) {
   if (!key_file.empty()) key_ = read_key_file("--token-key-file", key_file);
   if (token_file_.given()) read_token_file();
-  if (revoked_file_.given()) read_revoked_links();
+  if (!revoked_file_.given()) return;
+  read_revoked_links();
+  if (revoked_file_.was_blank())
+    log_warning({.event = "list_blank"},
+                "{}: is empty: no link is revoked (if it has lost its content, restore it before a "
+                "start; if none is to be revoked, write a line such as \"# none\")",
+                revoked_file_.source());
 }
 
 Permit AccessControl::permit(std::string_view token, std::int64_t now_unix_s,

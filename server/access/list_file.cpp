@@ -17,17 +17,14 @@ ListFile::ListFile(std::string_view flag, std::filesystem::path path)
 
 std::string ListFile::source() const { return fmt::format("{} {}", flag_, path_.string()); }
 
-bool ListFile::look(State& state) const {
+ListFile::State ListFile::look() const {
   std::error_code missing_time, missing_size;
-  state.written = std::filesystem::last_write_time(path_, missing_time);
-  state.bytes = std::filesystem::file_size(path_, missing_size);
-  return !missing_time && !missing_size;
+  const State state{std::filesystem::last_write_time(path_, missing_time),
+                    std::filesystem::file_size(path_, missing_size)};
+  return missing_time || missing_size ? State() : state;
 }
 
-bool ListFile::changed() const {
-  State now;
-  return given() && look(now) && now != read_;
-}
+bool ListFile::changed() const { return given() && look() != read_; }
 
 bool ListFile::is_news(std::string_view error) {
   return std::exchange(error_, std::string(error)) != error;
@@ -46,8 +43,7 @@ std::string ListFile::text() const {
 }
 
 std::vector<ListFile::Entry> ListFile::read() {
-  State now;
-  look(now);                           // before it is read: what is written meanwhile is a change
+  const State now = look();            // before it is read: what is written meanwhile is a change
   const std::string content = text();  // throws: it is read again, since it has changed
   read_ = now;
   error_.clear();

@@ -22,11 +22,13 @@ class ListFile {
   /// Throws InputError that names flag and path if the file cannot be read, or was emptied since:
   /// a loss of its content is no new content. A comment is one.
   std::vector<Entry> read();
-  /// True if it was written or replaced since it was read. A file that is missing has not changed.
+  /// True if it was written, replaced or removed since it was read.
   [[nodiscard]] bool changed() const;
   /// True for an error of read() that the last one did not throw.
   bool is_news(std::string_view error);
   [[nodiscard]] bool given() const { return !path_.empty(); }
+  /// Whether it had nothing when it was read, not even a comment.
+  [[nodiscard]] bool was_blank() const { return !had_text_; }
   /// "--token-file tokens"
   [[nodiscard]] std::string source() const;
 
@@ -36,8 +38,8 @@ class ListFile {
     std::uintmax_t bytes = 0;
     bool operator==(const State&) const = default;
   };
-  /// False: the file cannot be looked at.
-  bool look(State& state) const;
+  /// The default where there is no regular file.
+  [[nodiscard]] State look() const;
   [[nodiscard]] std::string text() const;
 
   const std::string flag_;

@@ -1,5 +1,7 @@
 #include "server/access/access.h"
 
+#include <optional>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,12 +9,14 @@
 
 #include "render_core/base/error.h"
 #include "tests/support/descriptor_limit.h"
+#include "tests/support/log_lines.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
 
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Optional;
 using testing::ThrowsMessage;
@@ -191,6 +195,25 @@ TEST_F(AccessTest, AnEmptiedFileRevivesNoLink) {
   EXPECT_TRUE(refusal(access, lost, "city", 0));
   write("# none\n");
   EXPECT_FALSE(refusal(access, lost, "city", 0)) << "somebody took the last one out";
+}
+
+TEST_F(AccessTest, LostAndEmptyListsAreToldOnce) {
+  const auto revoked = folder.write("revoked", "\n"),
+             tokens = folder.write("tokens", "alpha-alpha\n");
+  std::optional<AccessControl> access;
+  EXPECT_THAT(test::lines_of("human", "info", [&] { access.emplace(tokens, {}, false, revoked); }),
+              ElementsAre(AllOf(HasSubstr("--revoked-links"), HasSubstr("no link is revoked"))));
+  const auto use = [&] {
+    for (int i = 0; i < 3; ++i) (void)access->permit("alpha-alpha", 0, one_hall);
+  };
+  const auto written = std::filesystem::last_write_time(tokens);
+  std::filesystem::remove(tokens);
+  EXPECT_THAT(test::lines_of("human", "info", use),
+              ElementsAre(AllOf(HasSubstr("tokens: cannot be opened"),
+                                HasSubstr("the tokens read before stay in force"))));
+  folder.write("tokens", "alpha-alpha\n");
+  std::filesystem::last_write_time(tokens, written + std::chrono::seconds(2));
+  EXPECT_THAT(test::lines_of("human", "info", use), ElementsAre(HasSubstr("were read again")));
 }
 
 TEST_F(AccessTest, APipeInPlaceOfAListIsNotWaitedFor) {

@@ -6,7 +6,6 @@
 #include <csignal>
 #include <fstream>
 #include <functional>
-#include <sstream>
 #include <thread>
 
 #include <fcntl.h>
@@ -18,31 +17,17 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "tests/support/log_lines.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
 namespace {
 
+using test::lines_of;
 using testing::Contains;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
-
-/// The lines that are written while `log` logs.
-std::vector<std::string> lines_of(std::string_view format, std::string_view level,
-                                  const std::function<void()>& log) {
-  const auto before = spdlog::default_logger();
-  testing::internal::CaptureStderr();
-  set_up_log(format, level);
-  log();
-  spdlog::default_logger()->flush();
-  std::istringstream text(testing::internal::GetCapturedStderr());
-  spdlog::drop("catgs-server");
-  spdlog::set_default_logger(before);
-  std::vector<std::string> all;
-  for (std::string line; std::getline(text, line);) all.push_back(line);
-  return all;
-}
 
 /// Those that a line about nobody, one about a session, and one after it make.
 std::vector<std::string> lines(std::string_view format) {
