@@ -6,6 +6,8 @@ export default defineConfig({
   server: { host: '127.0.0.1' },
   resolve: { alias: { '#client': fileURLToPath(new URL('../web_client/src', import.meta.url)) } },
   test: {
+    // Files share what they import.
+    isolate: false,
     projects: [
       { extends: true, test: { name: 'unit', include: ['web_client/**/*.test.ts'] } },
       {
@@ -13,8 +15,10 @@ export default defineConfig({
         test: {
           name: 'browser',
           include: ['e2e/**/*.test.ts'],
-          // One browser and one server at a time: machines may have two cores.
+          // One after the other in one process, which has one browser: machines may have two cores.
           poolOptions: { forks: { singleFork: true } },
+          globalSetup: ['e2e/support/global_setup.ts'],
+          setupFiles: ['e2e/support/setup.ts'],
           testTimeout: 120_000,
           hookTimeout: 120_000,
           expect: { poll: { timeout: 60_000, interval: 100 } },

@@ -17,7 +17,7 @@ const key_file = path.join(folder, 'key');
 let workshop: RunningServer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '100000');
+  catgs_render('synth', 'city', scene, '--gaussians', '20000');
   unlinkSync(sidecar); // the sidecar of the scene that was just made
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);

@@ -103,9 +103,9 @@ it('a film is made for authors alone, within bounds', async () => {
       body: JSON.stringify(body),
       headers: { authorization: `Bearer ${access_token(role, key_file)}` },
     });
-  const wish = { kind: 'film', size: [64, 48], views: [[0, 0, -5, 0, 0, 0, 1, 60], 17_000] };
-  expect((await order('viewer', wish)).status).toBe(403);
-  const damaged = await order('author', { ...wish, views: [[0, 0, 'far']] });
+  const request = { kind: 'film', size: [64, 48], views: [[0, 0, -5, 0, 0, 0, 1, 60], 17_000] };
+  expect((await order('viewer', request)).status).toBe(403);
+  const damaged = await order('author', { ...request, views: [[0, 0, 'far']] });
   expect([damaged.status, await damaged.text()]).toEqual([
     400,
     expect.stringContaining('views[0]'),

@@ -3,7 +3,8 @@ import type { BrowserContextOptions, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { keep_screenshot, new_page, open } from './support/browser';
-import { start_fake_server, type FakeServer, type Script } from './support/fake_server';
+import { settle } from './support/camera';
+import { at_hello, start_fake_server, type FakeServer } from './support/fake_server';
 import { painted_jpeg, stream_of } from './support/painted';
 
 const windows: Readonly<Record<string, BrowserContextOptions>> = {
@@ -46,12 +47,14 @@ const panels = ['quality', 'stats', 'share', 'help'] as const;
 // axe-core's rules find the same in both windows: it looks at whole pages on a desktop, and at panels on a phone.
 const is_desktop = (window: string): boolean => window === 'desktop';
 
-let stream: Script;
 let server: FakeServer;
+let full: FakeServer; // all wait in its queue
 
 beforeAll(async () => {
-  stream = stream_of(await painted_jpeg());
-  server = await start_fake_server(stream, { tours, scenes });
+  server = await start_fake_server(stream_of(await painted_jpeg()), { tours, scenes });
+  full = await start_fake_server(
+    at_hello({ case: 'queue', value: { position: 12, estimateS: 45 } }),
+  );
 });
 
 const speaks = (page: Page): Promise<[string, string]> =>
@@ -108,26 +111,21 @@ describe.each([
   });
 
   it.each(Object.keys(windows))('the gallery, a queue and the editor do, on a %s', async (name) => {
-    const options = { ...windows[name], locale };
-    const gallery = await new_page(options);
-    await gallery.page.goto(server.url);
-    await gallery.page.getByRole('link', { name: 'Demo city' }).waitFor();
-    await keep_screenshot(gallery.page, `language-${language}-${name}-gallery`);
-    expect(await speaks(gallery.page)).toEqual([language, direction]);
-    if (is_desktop(name)) expect(await barriers(gallery.page)).toEqual([]);
+    const { page } = await new_page({ ...windows[name], locale });
+    await page.goto(server.url);
+    await page.getByRole('link', { name: 'Demo city' }).waitFor();
+    await keep_screenshot(page, `language-${language}-${name}-gallery`);
+    expect(await speaks(page)).toEqual([language, direction]);
+    if (is_desktop(name)) expect(await barriers(page)).toEqual([]);
 
-    const full = await start_fake_server((peer, body) => {
-      if (body.case === 'hello')
-        peer.say({ case: 'queue', value: { position: 12, estimateS: 45 } });
-    });
-    const queue = await new_page(options);
-    await queue.page.goto(full.url);
-    await queue.page.locator('#card-action').waitFor();
-    await keep_screenshot(queue.page, `language-${language}-${name}-queue`);
-    expect(await cut_off(queue.page)).toEqual([]);
-    if (is_desktop(name)) expect(await barriers(queue.page)).toEqual([]);
+    await page.goto(full.url);
+    await page.locator('#card-action').waitFor();
+    await keep_screenshot(page, `language-${language}-${name}-queue`);
+    expect(await cut_off(page)).toEqual([]);
+    if (is_desktop(name)) expect(await barriers(page)).toEqual([]);
 
-    const { page } = await open(`${server.url}?scene=city&author`, options);
+    await page.goto(`${server.url}?scene=city&author`);
+    await settle(page);
     await page.locator('#author-stops li').first().waitFor();
     await keep_screenshot(page, `language-${language}-${name}-author`);
     expect(await cut_off(page)).toEqual([]);

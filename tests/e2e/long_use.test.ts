@@ -17,7 +17,7 @@ import {
 import { start_server } from './support/programs';
 
 const minutes = Number(process.env['CATGS_USE_MINUTES'] ?? '0.5');
-const looks = Math.max(6, Math.ceil(minutes));
+const looks = Math.max(3, Math.ceil(minutes));
 
 // Half a minute shows some 700 pictures and ten minutes twenty times as many. So this is a hundred bytes
 // a picture in half a minute and five in ten. The statistics of two minutes take half of it.

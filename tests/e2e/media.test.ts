@@ -29,7 +29,7 @@ let jpeg: Buffer;
 let film: Buffer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '50000');
+  catgs_render('synth', 'city', scene, '--gaussians', '20000');
   unlinkSync(path.join(folder, 'hall.json'));
   writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   server = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
@@ -46,8 +46,7 @@ async function open_untouched(
   address: string,
   options?: BrowserContextOptions,
 ): Promise<WatchedPage> {
-  const watched = await new_page(options);
-  await watched.page.addInitScript(() =>
+  const watched = await new_page(options, () =>
     Object.defineProperty(navigator, 'userActivation', { value: { hasBeenActive: false } }),
   );
   await watched.page.goto(address);

@@ -223,8 +223,7 @@ describe('page', () => {
       peer.say({ case: 'queue', value: { position: 2, estimateS: 45 } });
       admit = () => stream(peer, body);
     });
-    const { page, errors } = await new_page();
-    await page.addInitScript(() => {
+    const { page, errors } = await new_page(undefined, () => {
       const told = { tones: 0 };
       const nodes = AudioScheduledSourceNode.prototype;
       const { start } = Object.getOwnPropertyDescriptors(nodes);

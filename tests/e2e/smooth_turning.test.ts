@@ -123,13 +123,13 @@ async function errors_px(
 
 it('things stay where they are while the camera turns over a slow link', async () => {
   const page = await open_with('on');
-  const captures = await captures_while_turning(page, 6);
+  const captures = await captures_while_turning(page, 4);
   const errors = await errors_px(page, 'warp', captures, 'drawn');
   const uncovered = captures.map((shot) => shot.uncovered);
-  await page.context().close();
+  await page.close();
 
   const plain = await open_with('off');
-  const unwarped = await captures_while_turning(plain, 3);
+  const unwarped = await captures_while_turning(plain, 2);
   const without = await errors_px(plain, 'plain', unwarped, 'now');
   const list = (values: number[], digits: number): string =>
     values.map((v) => v.toFixed(digits)).join(' ');

@@ -22,7 +22,7 @@ const scene = path.join(folder, 'city.ply');
 let server: RunningServer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '100000');
+  catgs_render('synth', 'city', scene, '--gaussians', '30000');
   // Two stops between the start and the middle of the city, each with a hotspot ahead of it.
   write_tours(path.join(folder, 'city.json'), ({ focus, start_pose }) => {
     const between = (share: number): number[] =>

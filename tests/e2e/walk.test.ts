@@ -9,7 +9,7 @@ import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
-import { scratch_folder } from './support/scenes';
+import { crop_streets, scratch_folder } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
@@ -19,7 +19,9 @@ const street: Vec3 = [0, -eye_m, -8];
 let server: RunningServer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '300000');
+  const city = path.join(scratch_folder(), 'whole.ply');
+  catgs_render('synth', 'city', city, '--gaussians', '300000');
+  crop_streets(city, scene, 0, 3);
   const stop = (title: string, position: Vec3) => ({ title, position, look_at: [0, -1.6, 60] });
   writeFileSync(
     path.join(folder, 'city.json'),
@@ -63,8 +65,8 @@ describe('a visitor who walks', () => {
     await page.keyboard.down('ShiftLeft');
     await page.keyboard.down('KeyD');
     let before = begin;
-    for (let k = 0; k < 12; ++k) {
-      await page.waitForTimeout(500);
+    for (let k = 0; k < 24; ++k) {
+      await page.waitForTimeout(250);
       const now = await pose_of(page);
       expect(Math.abs(height(now) - eye_m)).toBeLessThan(0.8);
       if (distance(before, now) < 1e-3 && k > 2) break;
@@ -75,7 +77,7 @@ describe('a visitor who walks', () => {
     await settle(page);
     const at_wall = await pose_of(page);
     await page.keyboard.down('KeyD');
-    await page.waitForTimeout(800);
+    await page.waitForTimeout(400);
     await page.keyboard.up('KeyD');
     await settle(page);
     const across = (a: Pose, b: Pose): number => {
@@ -103,7 +105,7 @@ describe('a visitor who walks', () => {
     await page.keyboard.press('ArrowLeft');
     await settle(page);
     const stopped = await pose_of(page);
-    await page.waitForTimeout(500);
+    await page.waitForTimeout(300);
     expect(distance(stopped, await pose_of(page))).toBeLessThan(0.05);
   });
 });

@@ -1,9 +1,12 @@
 // A clock that tests move by hand, a socket whose other end is the test, and a storage in memory.
 import { create, fromBinary, toBinary, type MessageInitShape } from '@bufbuild/protobuf';
 import type { Clock, Timers } from '#client/base/clock';
+import { Session } from '#client/session/session';
+import type { SessionState } from '#client/session/state';
 import type { OpenSocket, SocketEvents } from '#client/transport/socket';
 import {
   ClientMessageSchema,
+  Codec,
   FrameHeaderSchema,
   ServerMessageSchema,
   type ClientMessage,
@@ -73,12 +76,58 @@ export class FakeSocket {
   }
 }
 
-/** Opens sockets that the test holds in `sockets`, in order. */
-export function fake_network(): { open: OpenSocket; sockets: FakeSocket[] } {
-  const sockets: FakeSocket[] = [];
-  const open: OpenSocket = (events) => {
+const ignore = (): void => undefined;
+
+/** A session over sockets of the test, and what it told the page. */
+export class FakeSession {
+  readonly time = new FakeTime();
+  readonly sockets: FakeSocket[] = [];
+  readonly states: SessionState[] = [];
+  readonly notices: string[] = [];
+  readonly session: Session;
+
+  constructor(listener: Partial<ConstructorParameters<typeof Session>[1]>) {
+    this.session = new Session(
+      { open: this.open, clock: this.time, timers: this.time, random: () => 0.5 },
+      {
+        state: (state) => this.states.push(state),
+        notice: (message) => this.notices.push(message),
+        welcome: ignore,
+        config: ignore,
+        frame: ignore,
+        stream_ended: ignore,
+        stats: ignore,
+        picked: ignore,
+        pinged: ignore,
+        participants: ignore,
+        lead: ignore,
+        stayed: ignore,
+        ...listener,
+      },
+      {
+        sceneId: 'city',
+        viewportWidthPx: 640,
+        viewportHeightPx: 360,
+        decoders: [Codec.H264],
+        token: 'secret',
+      },
+    );
+  }
+
+  get last_state(): SessionState | undefined {
+    return this.states.at(-1);
+  }
+
+  /** The connections that the session opened, in order. */
+  socket(i: number): FakeSocket {
+    const found = this.sockets[i];
+    if (!found) throw new Error(`connection ${i} was not opened`);
+    return found;
+  }
+
+  private readonly open: OpenSocket = (events) => {
     const socket = new FakeSocket(events);
-    sockets.push(socket);
+    this.sockets.push(socket);
     return {
       send: (bytes) => socket.heard.push(fromBinary(ClientMessageSchema, bytes).body),
       buffered_bytes: () => socket.buffered_bytes,
@@ -87,5 +136,4 @@ export function fake_network(): { open: OpenSocket; sockets: FakeSocket[] } {
       },
     };
   };
-  return { open, sockets };
 }

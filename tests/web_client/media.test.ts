@@ -122,9 +122,9 @@ describe('a file that an author sends', () => {
     ['門.png', [], 'file.png'],
     ['door.jpg', ['DOOR.jpg', 'door-2.jpg'], 'door-3.jpg'],
     [`${'x'.repeat(200)}.webp`, [], `${'x'.repeat(80)}.webp`],
-  ])('%s gets a name that the server takes and no other file has', (wish, taken, name) => {
-    expect(free_name(wish, taken)).toBe(name);
-    expect(free_name(wish, taken)).toMatch(/^[\w-][\w.-]{0,99}$/);
+  ])('%s gets a name that the server takes and no other file has', (wanted, taken, name) => {
+    expect(free_name(wanted, taken)).toBe(name);
+    expect(free_name(wanted, taken)).toMatch(/^[\w-][\w.-]{0,99}$/);
   });
 });
 

@@ -1,11 +1,11 @@
 import { beforeEach, describe, expect, it } from 'vitest';
 import { backoff_ms } from '#client/session/backoff';
 import { greeting_ms, silence_ms } from '#client/session/link';
-import { Session } from '#client/session/session';
+import type { Session } from '#client/session/session';
 import type { SessionState } from '#client/session/state';
 import { card_for } from '#client/ui/wording';
 import { Codec, Error_Code } from '#client/wire/wire';
-import { fake_network, FakeTime, type FakeSocket } from './fakes';
+import { FakeSession, type FakeSocket, type FakeTime } from './fakes';
 
 const pose = (id: bigint) => ({
   poseId: id,
@@ -14,10 +14,10 @@ const pose = (id: bigint) => ({
   fovYRad: 1,
 });
 
+let fake: FakeSession;
 let time: FakeTime;
 let sockets: FakeSocket[];
 let session: Session;
-let states: SessionState[];
 let frames: bigint[];
 let configs: string[];
 let notices: string[];
@@ -25,50 +25,25 @@ let stayed: string[];
 let streams_ended: number;
 
 beforeEach(() => {
-  time = new FakeTime();
-  const network = fake_network();
-  sockets = network.sockets;
-  states = [];
   frames = [];
   configs = [];
-  notices = [];
   stayed = [];
   streams_ended = 0;
-  session = new Session(
-    { open: network.open, clock: time, timers: time, random: () => 0.5 },
-    {
-      state: (state) => states.push(state),
-      welcome: () => undefined,
-      config: (config) => configs.push(config.encoder),
-      frame: (header) => frames.push(header.frameId),
-      stream_ended: () => {
-        streams_ended += 1;
-        session.send({ case: 'ack', value: { frameId: 99n } });
-      },
-      stats: () => undefined,
-      picked: () => undefined,
-      pinged: () => undefined,
-      participants: () => undefined,
-      lead: () => undefined,
-      notice: (message) => notices.push(message),
-      stayed: (message) => stayed.push(message),
+  fake = new FakeSession({
+    config: (config) => configs.push(config.encoder),
+    frame: (header) => frames.push(header.frameId),
+    stream_ended: () => {
+      streams_ended += 1;
+      session.send({ case: 'ack', value: { frameId: 99n } });
     },
-    {
-      sceneId: 'city',
-      viewportWidthPx: 640,
-      viewportHeightPx: 360,
-      decoders: [Codec.H264],
-      token: 'secret',
-    },
-  );
+    stayed: (message) => stayed.push(message),
+  });
+  ({ time, sockets, session, notices } = fake);
 });
 
-const last_state = (): SessionState | undefined => states[states.length - 1];
-const socket = (i: number): FakeSocket => {
-  const found = sockets[i];
-  if (!found) throw new Error(`connection ${i} was not opened`);
-  return found;
-};
+const last_state = (): SessionState | undefined => fake.last_state;
+const socket = (i: number): FakeSocket => fake.socket(i);
+const poses = (of: FakeSocket): bigint[] => of.sent('pose').map(({ poseId }) => poseId);
 
 function welcome(to: FakeSocket, encoder = 'x264'): void {
   to.events.opened();
@@ -98,11 +73,7 @@ describe('greeting', () => {
     socket(0).say({ case: 'welcome', value: { config: { encoder: 'x264' } } });
     expect(last_state()).toEqual({ phase: 'live' });
     expect(configs).toEqual(['x264']);
-    expect(
-      socket(0)
-        .sent('pose')
-        .map((sample) => sample.poseId),
-    ).toEqual([1n]);
+    expect(poses(socket(0))).toEqual([1n]);
   });
 
   it('shows the queue while it waits for its turn', () => {
@@ -147,11 +118,7 @@ describe('reconnecting', () => {
       pose: { poseId: 7n },
     });
     socket(1).say({ case: 'welcome', value: {} });
-    expect(
-      socket(1)
-        .sent('pose')
-        .map((sample) => sample.poseId),
-    ).toEqual([7n]);
+    expect(poses(socket(1))).toEqual([7n]);
     expect(last_state()).toEqual({ phase: 'live' });
   });
 
@@ -284,11 +251,7 @@ describe('drain', () => {
     session.send_pose(pose(4n));
     old.say({ case: 'drain', value: { deadlineMs: 5000 } });
     welcome(socket(1), 'nvenc');
-    expect(
-      socket(1)
-        .sent('pose')
-        .map((sample) => sample.poseId),
-    ).toEqual([4n]);
+    expect(poses(socket(1))).toEqual([4n]);
     old.frame({ frameId: 10n });
     expect(old.closed).toBe(false);
     expect(configs).toEqual(['x264']);
@@ -302,11 +265,7 @@ describe('drain', () => {
     expect(old.sent('ack')).toHaveLength(1);
     expect(socket(1).sent('ack')).toEqual([]);
     session.send_pose(pose(5n));
-    expect(
-      socket(1)
-        .sent('pose')
-        .map((sample) => sample.poseId),
-    ).toEqual([4n, 4n, 5n]);
+    expect(poses(socket(1))).toEqual([4n, 4n, 5n]);
   });
 
   it('tries again when the new connection fails, while the old one lives', () => {
@@ -338,11 +297,7 @@ describe('drain', () => {
     expect(last_state()?.phase).toBe('connecting');
     welcome(socket(1));
     expect(last_state()).toEqual({ phase: 'live' });
-    expect(
-      socket(1)
-        .sent('pose')
-        .map((sample) => sample.poseId),
-    ).toEqual([4n]);
+    expect(poses(socket(1))).toEqual([4n]);
     expect(sockets).toHaveLength(2);
   });
 
@@ -365,7 +320,7 @@ describe('poses', () => {
     expect(first.sent('pose')).toEqual([]);
     first.buffered_bytes = 0;
     time.advance(100);
-    expect(first.sent('pose').map((sample) => sample.poseId)).toEqual([2n]);
+    expect(poses(first)).toEqual([2n]);
   });
 
   it('are repeated now and then, but not for a hidden page', () => {
@@ -378,7 +333,7 @@ describe('poses', () => {
       }
     };
     beat(25);
-    expect(first.sent('pose').map((sample) => sample.poseId)).toEqual([1n, 1n, 1n]);
+    expect(poses(first)).toEqual([1n, 1n, 1n]);
     session.set_paused(true);
     expect(first.sent('pause')).toMatchObject([{ paused: true }]);
     beat(25);

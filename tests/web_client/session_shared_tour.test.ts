@@ -1,10 +1,9 @@
 // A session whose visitor watches or follows another one.
 import { beforeEach, describe, expect, it } from 'vitest';
 import { backoff_ms } from '#client/session/backoff';
-import { Session } from '#client/session/session';
-import type { SessionState } from '#client/session/state';
-import { Codec, Error_Code } from '#client/wire/wire';
-import { fake_network, FakeTime, type FakeSocket } from './fakes';
+import type { Session } from '#client/session/session';
+import { Error_Code } from '#client/wire/wire';
+import { FakeSession, type FakeSocket, type FakeTime } from './fakes';
 
 const pose = {
   poseId: 1n,
@@ -12,55 +11,20 @@ const pose = {
   worldFromCamera: { orientation: { w: 1 } },
   fovYRad: 1,
 };
-const ignore = (): void => undefined;
-
+let fake: FakeSession;
 let time: FakeTime;
-let sockets: FakeSocket[];
 let session: Session;
-let states: SessionState[];
 let notices: string[];
 let hosts: string[];
 
 beforeEach(() => {
-  time = new FakeTime();
-  const network = fake_network();
-  sockets = network.sockets;
-  states = [];
-  notices = [];
   hosts = [];
-  session = new Session(
-    { open: network.open, clock: time, timers: time, random: () => 0.5 },
-    {
-      state: (state) => states.push(state),
-      notice: (message) => notices.push(message),
-      lead: ({ name }) => hosts.push(name),
-      welcome: ignore,
-      config: ignore,
-      frame: ignore,
-      stream_ended: ignore,
-      stats: ignore,
-      picked: ignore,
-      pinged: ignore,
-      participants: ignore,
-      stayed: ignore,
-    },
-    {
-      sceneId: 'city',
-      viewportWidthPx: 640,
-      viewportHeightPx: 360,
-      decoders: [Codec.H264],
-      token: 'secret',
-    },
-  );
+  fake = new FakeSession({ lead: ({ name }) => hosts.push(name) });
+  ({ time, session, notices } = fake);
 });
 
-const last_state = (): SessionState | undefined => states[states.length - 1];
+const socket = (i: number): FakeSocket => fake.socket(i);
 const cases = (i: number): unknown[] => socket(i).heard.map((body) => body.case);
-const socket = (i: number): FakeSocket => {
-  const found = sockets[i];
-  if (!found) throw new Error(`connection ${i} was not opened`);
-  return found;
-};
 
 /** The visitor has a session of its own. */
 function go_live(): void {
@@ -84,7 +48,7 @@ describe('a session in a shared tour', () => {
       case: 'error',
       value: { code: Error_Code.SESSION_ENDED, message: 'over', fatal: true },
     });
-    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'no_host' });
+    expect(fake.last_state).toMatchObject({ phase: 'waiting', cause: 'no_host' });
     session.retry();
     socket(1).events.opened();
     expect(socket(1).sent('hello')[0]).toMatchObject({ watch: 'w' });
@@ -164,7 +128,7 @@ describe('a session in a shared tour', () => {
     });
     own.say({ case: 'welcome', value: {} });
     expect(cases(tries + 1)).toEqual(['hello']); // it would be led away again
-    expect(last_state()).toEqual({ phase: 'live' });
+    expect(fake.last_state).toEqual({ phase: 'live' });
   });
 
   it('keeps watching a host who enters one scene after the other', () => {

@@ -8,7 +8,7 @@ const source = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe
 /** What axe-core finds wrong in the page, by all of its rules: the rule, and the first lines of each element. */
 export async function barriers(page: AnyPage): Promise<string[]> {
   // By the debugger, because the page's own policy lets no foreign script in.
-  await page.evaluate(`(() => { ${source}\n})()`);
+  if (!(await page.evaluate('"axe" in window'))) await page.evaluate(`(() => { ${source}\n})()`);
   return page.evaluate(async () => {
     const { axe } = window as unknown as { axe: typeof import('axe-core') };
     const { violations } = await axe.run(document, { resultTypes: ['violations'] });

@@ -1,16 +1,8 @@
 // Chromium as the tests use it, and a page that records everything that went wrong in it.
 import { existsSync, mkdirSync } from 'node:fs';
 import path from 'node:path';
-import {
-  chromium,
-  type Browser,
-  type BrowserContext,
-  type BrowserContextOptions,
-  type Page,
-} from 'playwright-core';
-import { afterEach } from 'vitest';
+import { chromium, type Browser, type BrowserContextOptions, type Page } from 'playwright-core';
 import { settle } from './camera';
-import { clean_up } from './clean_up';
 import { artefacts, chromium_path } from './paths';
 
 export const insecure_host = 'plain.test';
@@ -28,13 +20,14 @@ export const windows = {
   },
 } as const satisfies Record<string, BrowserContextOptions>;
 
-let browser: Browser | undefined;
+let browser: Promise<Browser> | undefined;
 
-async function launch_browser(): Promise<Browser> {
+function launch_browser(): Promise<Browser> {
   if (!existsSync(chromium_path)) {
     throw new Error(`no Chromium at ${chromium_path}: apt install chromium, or set CATGS_CHROMIUM`);
   }
-  const launched = await chromium.launch({
+  // It ends with this process.
+  return chromium.launch({
     executablePath: chromium_path,
     headless: true,
     args: [
@@ -49,8 +42,6 @@ async function launch_browser(): Promise<Browser> {
       `--host-resolver-rules=MAP ${insecure_host} 127.0.0.1`,
     ],
   });
-  clean_up(() => launched.close());
-  return launched;
 }
 
 export interface WatchedPage {
@@ -59,20 +50,92 @@ export interface WatchedPage {
   readonly errors: string[];
 }
 
-const open_contexts: BrowserContext[] = [];
+/** A page in a context of its own. After a test it is emptied, and a later test of the same kind gets it. */
+interface Tab {
+  readonly page: Page;
+  readonly kind: string;
+  readonly is_prepared: boolean; // by a script that nothing takes out again
+}
 
-afterEach(async () => {
-  for (const context of open_contexts.splice(0)) await context.close();
-});
+const used: Tab[] = [];
+const free: Tab[] = [];
 
-/** A page that is closed after the test, in a browser that all tests of a file share. */
+const default_options: BrowserContextOptions = { viewport: { width: 640, height: 360 } };
+
+/** The options that a page keeps for its life. The others are set for each test. */
+const kind_of = (options: BrowserContextOptions): string =>
+  JSON.stringify({ ...options, viewport: 0, colorScheme: 0, reducedMotion: 0 });
+
+/** Takes what the test has left in the page: listeners, routes, settings, and its visit. */
+async function empty({ page }: Tab): Promise<void> {
+  for (const event of ['console', 'pageerror', 'request'] as const) page.removeAllListeners(event);
+  await page.unrouteAll({ behavior: 'ignoreErrors' });
+  for (const other of page.context().pages()) if (other !== page) await other.close();
+  for (const frame of page.frames())
+    await frame
+      .evaluate(() => {
+        localStorage.clear();
+        sessionStorage.clear();
+      })
+      .catch(() => undefined); // a frame without an origin has no storage
+  await page.goto('about:blank');
+  await page.mouse.move(0, 0);
+}
+
+/** Empties it for the next test, or closes it where that is not enough. */
+async function give_back(tab: Tab, is_reusable: boolean): Promise<void> {
+  if (!is_reusable || tab.is_prepared || tab.page.isClosed()) return tab.page.context().close();
+  await empty(tab);
+  free.push(tab);
+}
+
+/** Takes back the pages of a test. Those of a failed one are not used again. */
+export async function give_back_pages(are_reusable: boolean): Promise<void> {
+  for (const tab of used.splice(0)) await give_back(tab, are_reusable);
+}
+
+async function take_tab(options: BrowserContextOptions, prepare?: () => void): Promise<Tab> {
+  const kind = kind_of(options);
+  const at = prepare ? -1 : free.findIndex((tab) => tab.kind === kind);
+  const [tab] = at < 0 ? [await make_tab(options, kind, prepare)] : free.splice(at, 1);
+  await tab!.page.setViewportSize(options.viewport ?? windows.desktop.viewport);
+  await tab!.page.emulateMedia({
+    colorScheme: options.colorScheme ?? 'light',
+    reducedMotion: options.reducedMotion ?? 'no-preference',
+  });
+  return tab!;
+}
+
+async function make_tab(
+  options: BrowserContextOptions,
+  kind: string,
+  prepare?: () => void,
+): Promise<Tab> {
+  browser ??= launch_browser();
+  const context = await (await browser).newContext(options);
+  if (prepare) await context.addInitScript(prepare);
+  return { page: await context.newPage(), kind, is_prepared: prepare !== undefined };
+}
+
+/** Does something in a page, and returns what that returns. */
+export async function in_page<T>(work: (page: Page) => Promise<T>): Promise<T> {
+  const tab = await take_tab(default_options);
+  const made = await work(tab.page);
+  await give_back(tab, true);
+  return made;
+}
+
+/**
+ * A page for this test, in a browser that all tests share. `prepare` runs in it before any script of its
+ * documents.
+ */
 export async function new_page(
-  options: BrowserContextOptions = { viewport: { width: 640, height: 360 } },
+  options: BrowserContextOptions = default_options,
+  prepare?: () => void,
 ): Promise<WatchedPage> {
-  browser ??= await launch_browser();
-  const context = await browser.newContext(options);
-  open_contexts.push(context);
-  const page = await context.newPage();
+  const tab = await take_tab(options, prepare);
+  used.push(tab);
+  const { page } = tab;
   const errors: string[] = [];
   page.on('console', (message) => {
     if (message.type() === 'error') errors.push(message.text());

@@ -1,5 +1,5 @@
 // Small pictures, films and sounds, made here so that no test needs a file or a program for them.
-import { new_page } from './browser';
+import { in_page } from './browser';
 
 /** A quiet tone as a WAV file: mono, 8 kHz, 8 bits. */
 export function tone(seconds: number): Buffer {
@@ -23,33 +23,33 @@ export function tone(seconds: number): Buffer {
 
 /** A film of a second, as the browser records a canvas. */
 export async function painted_film(): Promise<Buffer> {
-  const { page } = await new_page();
-  const url = await page.evaluate(async () => {
-    const canvas = document.createElement('canvas');
-    canvas.width = 320;
-    canvas.height = 180;
-    const context = canvas.getContext('2d')!;
-    const recorder = new MediaRecorder(canvas.captureStream(10), {
-      mimeType: 'video/webm;codecs=vp8',
-    });
-    const pieces: Blob[] = [];
-    recorder.ondataavailable = ({ data }) => pieces.push(data);
-    recorder.start();
-    for (let i = 0; i < 10; ++i) {
-      context.fillStyle = `hsl(${i * 36} 60% 50%)`;
-      context.fillRect(0, 0, 320, 180);
-      await new Promise((resolve) => setTimeout(resolve, 100));
-    }
-    const stopped = new Promise((resolve) => recorder.addEventListener('stop', resolve));
-    recorder.stop();
-    await stopped;
-    return new Promise<string>((resolve) => {
-      const reader = new FileReader();
-      reader.onload = () => resolve(reader.result as string);
-      reader.readAsDataURL(new Blob(pieces));
-    });
-  });
-  await page.context().close();
+  const url = await in_page((page) =>
+    page.evaluate(async () => {
+      const canvas = document.createElement('canvas');
+      canvas.width = 320;
+      canvas.height = 180;
+      const context = canvas.getContext('2d')!;
+      const recorder = new MediaRecorder(canvas.captureStream(10), {
+        mimeType: 'video/webm;codecs=vp8',
+      });
+      const pieces: Blob[] = [];
+      recorder.ondataavailable = ({ data }) => pieces.push(data);
+      recorder.start();
+      for (let i = 0; i < 10; ++i) {
+        context.fillStyle = `hsl(${i * 36} 60% 50%)`;
+        context.fillRect(0, 0, 320, 180);
+        await new Promise((resolve) => setTimeout(resolve, 100));
+      }
+      const stopped = new Promise((resolve) => recorder.addEventListener('stop', resolve));
+      recorder.stop();
+      await stopped;
+      return new Promise<string>((resolve) => {
+        const reader = new FileReader();
+        reader.onload = () => resolve(reader.result as string);
+        reader.readAsDataURL(new Blob(pieces));
+      });
+    }),
+  );
   return Buffer.from(url.split(',')[1]!, 'base64');
 }
 

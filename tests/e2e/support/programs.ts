@@ -37,9 +37,9 @@ export interface RunningServer {
 export async function start_server(scene: string, args: string[] = []): Promise<RunningServer> {
   const child = spawn(
     program('catgs-server'),
-    // No proxy watches /readyz here, and there is no other server to go to.
+    // No proxy watches /readyz here, and there is no other server to go to. The rate is enough to see motion.
     [
-      ...['--scene', scene, '--port', '0', '--admin-bind', 'off'],
+      ...['--scene', scene, '--port', '0', '--admin-bind', 'off', '--fps', '20'],
       ...['--drain-wait', '0', '--drain-deadline', '1'],
       ...args,
     ],

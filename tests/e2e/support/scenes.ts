@@ -25,6 +25,12 @@ export function make_demo(folder: string): string {
   return file('city.ply');
 }
 
+/** Cuts the streets around a point out of the city, because floors takes as long as the area is large. */
+export function crop_streets(city: string, file: string, x: number, z: number): void {
+  const box = [x - 24, -60, z - 33, x + 24, 2, z + 33];
+  catgs_render('convert', city, file, `--crop=${box.join()}`);
+}
+
 export interface Sidecar {
   readonly focus: Vec3;
   readonly start_pose: Pose;

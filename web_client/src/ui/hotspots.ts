@@ -60,7 +60,7 @@ export class Hotspots {
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
       const target = stop.portal && this.scenes_.target_of(stop.portal);
-      const sign = target ? icon('door') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
+      const sign = target ? icon('portal') : make('span', { 'aria-hidden': 'true' }, number(i + 1));
       // It is hidden until it is placed.
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
       button.classList.toggle('portal', target !== undefined);
