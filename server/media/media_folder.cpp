@@ -101,7 +101,8 @@ std::vector<MediaFile> MediaFolder::list() const {
 }
 
 bool MediaFolder::save(const std::string& name, std::string_view content,
-                       const MayReplace& may_replace) const {
+                       const MayReplace& may_replace,
+                       const std::function<bool()>& somebody_waits) const {
   check_media(name, content);
   std::error_code error;
   fs::create_directory(path_, error);
@@ -112,7 +113,7 @@ bool MediaFolder::save(const std::string& name, std::string_view content,
         "let the operator make it, writable for the server");
   require_room(name, content.size());
   Replacement fresh(path_ / name, content, by_hand);  // this may take long, and without the lock
-  const FileLock lock = lock_for_saving(path_.parent_path());
+  const FileLock lock = lock_for_saving(path_.parent_path(), save_patience, somebody_waits);
   const std::optional<MediaFile> there = find(name);
   if (!may_replace(there ? there->etag : "")) return false;
   require_room(name, content.size());
