@@ -54,12 +54,13 @@ bool is_link_id(std::string_view id) {
 }
 
 /// Reads a list again that was changed while the server runs.
-void read_again(std::string_view what, const std::function<void()>& read) {
+void read_again(std::string_view what, ListFile& list, const std::function<void()>& read) {
   try {
     read();
     log_info({.event = "list_read"}, "{} were read again", what);
   } catch (const InputError& bad) {
-    log_error({.event = "list_unreadable"}, "{}; {} read before stay in force", bad.what(), what);
+    if (list.is_news(bad.what()))
+      log_error({.event = "list_unreadable"}, "{}; {} read before stay in force", bad.what(), what);
   }
 }
 
@@ -189,7 +190,7 @@ std::variant<LinkGrant, std::string> AccessControl::read(std::string_view token,
 }
 
 const std::vector<AccessControl::StaticToken>& AccessControl::static_tokens() {
-  if (token_file_.changed()) read_again("the tokens", [&] { read_token_file(); });
+  if (token_file_.changed()) read_again("the tokens", token_file_, [&] { read_token_file(); });
   return tokens_;
 }
 
@@ -212,7 +213,8 @@ bool AccessControl::ended(std::string_view token_id) {
 
 RevokedLinks AccessControl::revoked_links() {
   const std::lock_guard lock(mutex_);
-  if (revoked_file_.changed()) read_again("the revoked links", [&] { read_revoked_links(); });
+  if (revoked_file_.changed())
+    read_again("the revoked links", revoked_file_, [&] { read_revoked_links(); });
   return revoked_;
 }
 

@@ -29,6 +29,10 @@ bool ListFile::changed() const {
   return given() && look(now) && now != read_;
 }
 
+bool ListFile::is_news(std::string_view error) {
+  return std::exchange(error_, std::string(error)) != error;
+}
+
 /// Waits for no writer of a pipe that has taken the file's place.
 std::string ListFile::text() const {
   constexpr std::uint64_t max_bytes = 16 << 20;
@@ -42,8 +46,11 @@ std::string ListFile::text() const {
 }
 
 std::vector<ListFile::Entry> ListFile::read() {
-  look(read_);  // before it is read: what is written meanwhile is a change
-  const std::string content = text();
+  State now;
+  look(now);                           // before it is read: what is written meanwhile is a change
+  const std::string content = text();  // throws: it is read again, since it has changed
+  read_ = now;
+  error_.clear();
   const bool is_blank = content.find_first_not_of(" \t\r\n") == std::string::npos;
   if (is_blank && had_text_)
     throw InputError(

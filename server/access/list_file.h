@@ -22,8 +22,10 @@ class ListFile {
   /// Throws InputError that names flag and path if the file cannot be read, or was emptied since:
   /// a loss of its content is no new content. A comment is one.
   std::vector<Entry> read();
-  /// True if it was written or replaced since read(). A file that is missing has not changed.
+  /// True if it was written or replaced since it was read. A file that is missing has not changed.
   [[nodiscard]] bool changed() const;
+  /// True for an error of read() that the last one did not throw.
+  bool is_news(std::string_view error);
   [[nodiscard]] bool given() const { return !path_.empty(); }
   /// "--token-file tokens"
   [[nodiscard]] std::string source() const;
@@ -42,6 +44,7 @@ class ListFile {
   const std::filesystem::path path_;
   State read_;
   bool had_text_ = false;  // when it was read last
+  std::string error_;      // since then
 };
 
 }  // namespace catgs

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include "render_core/base/error.h"
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs {
@@ -206,6 +207,20 @@ TEST_F(AccessTest, APipeInPlaceOfAListIsNotWaitedFor) {
   EXPECT_THAT(
       [&] { AccessControl(tokens, {}); },
       ThrowsMessage<InputError>(AllOf(HasSubstr("--token-file"), HasSubstr("not a regular file"))));
+}
+
+TEST_F(AccessTest, AListThatCannotBeReadNowIsReadLater) {
+  const std::string lost = make_link_token({"city", "viewer", 1000, "0123456789ab"}, key);
+  const auto path = folder.write("revoked", "# none\n");
+  AccessControl access({}, folder.write("key", std::string(key)), false, path);
+  const auto later = std::filesystem::last_write_time(path) + std::chrono::seconds(2);
+  folder.write("revoked", "0123456789ab\n");
+  std::filesystem::last_write_time(path, later);
+  {
+    const test::DescriptorLimit none_is_left(test::next_descriptor());
+    EXPECT_FALSE(refusal(access, lost, "city", 0)) << "those read before stay in force";
+  }
+  EXPECT_TRUE(refusal(access, lost, "city", 0));
 }
 
 TEST_F(AccessTest, RevokedLinksHaveANumberAndAForm) {
