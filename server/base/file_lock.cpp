@@ -32,14 +32,15 @@ int open_lock(const fs::path& file) {
 
 }  // namespace
 
-FileLock::FileLock(const fs::path& file, std::chrono::milliseconds patience)
+FileLock::FileLock(const fs::path& file, std::chrono::milliseconds patience,
+                   const std::function<bool()>& is_needed)
     : descriptor_(open_lock(file)) {
   const auto end = std::chrono::steady_clock::now() + patience;
   while (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
-    const bool taken = error == EWOULDBLOCK;
     if (error == EINTR) continue;
-    if (!taken || std::chrono::steady_clock::now() >= end) {
+    const bool waits = std::chrono::steady_clock::now() < end && is_needed();
+    if (error != EWOULDBLOCK || !waits) {
       ::close(descriptor_);
       throw std::system_error(error, std::generic_category());
     }

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string_view>
 #include <utility>
 
@@ -11,9 +12,12 @@ namespace catgs {
 /// process.
 class FileLock {
  public:
-  /// Makes the file if it is missing. Waits so long for another holder. Throws std::system_error;
-  /// its code is std::errc::resource_unavailable_try_again where another holder stays.
-  explicit FileLock(const std::filesystem::path& file, std::chrono::milliseconds patience = {});
+  /// Makes the file if it is missing. Waits so long for another holder, and no longer than anybody
+  /// needs the lock. Throws std::system_error; its code is
+  /// std::errc::resource_unavailable_try_again where another holder stays.
+  explicit FileLock(
+      const std::filesystem::path& file, std::chrono::milliseconds patience = {},
+      const std::function<bool()>& is_needed = [] { return true; });
   FileLock(FileLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   FileLock& operator=(FileLock&&) = delete;
   ~FileLock();

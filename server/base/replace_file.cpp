@@ -90,10 +90,11 @@ void overwrite_file(const fs::path& file, std::string_view content, std::string_
   Replacement(file, content, remedy).take_place();
 }
 
-FileLock lock_for_saving(const fs::path& folder, std::chrono::milliseconds patience) {
+FileLock lock_for_saving(const fs::path& folder, std::chrono::milliseconds patience,
+                         const std::function<bool()>& is_needed) {
   const fs::path lock = folder / ".catgs-lock";
   try {
-    return FileLock(lock, patience);
+    return FileLock(lock, patience, is_needed);
   } catch (const std::system_error& failure) {
     if (failure.code() == std::errc::resource_unavailable_try_again)
       throw FolderBusy("", "", "another server saves in this folder", "try again in a moment");

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string_view>
 
 #include "render_core/base/error.h"
@@ -39,11 +40,13 @@ struct FolderBusy : InputError {
   using InputError::InputError;
 };
 
-/// The lock for saves in a scene's folder, which servers over one folder take in turn. Hold it from
-/// the look at a file until another one has its place. Throws FolderBusy after `patience`, and
-/// InputError with the remedy where the lock's file cannot be made.
+/// The lock for saves in a folder, which servers over one folder take in turn. Hold it from the
+/// look at a file until another one has its place. Throws FolderBusy after `patience`, or when the
+/// lock is not needed any more, and InputError with the remedy where the lock's file cannot be
+/// made.
 inline constexpr std::chrono::seconds save_patience{5};
-FileLock lock_for_saving(const std::filesystem::path& folder,
-                         std::chrono::milliseconds patience = save_patience);
+FileLock lock_for_saving(
+    const std::filesystem::path& folder, std::chrono::milliseconds patience = save_patience,
+    const std::function<bool()>& is_needed = [] { return true; });
 
 }  // namespace catgs

@@ -136,7 +136,9 @@ DayCounts VisitBook::day(const std::string& date) const {
 DayCounts VisitBook::saved(const std::string& date) const {
   const fs::path file = file_of(date);
   std::error_code error;
-  if (!fs::exists(fs::symlink_status(file, error))) return {};
+  const fs::file_type type = fs::symlink_status(file, error).type();
+  if (type == fs::file_type::not_found) return {};
+  if (type == fs::file_type::regular) FileSource{file};  // throws: it may be opened later
   try {
     return read_counts(FileSource(file));
   } catch (const InputError& failure) {

@@ -34,7 +34,8 @@ class VisitBook {
 
   /// The days that have counts, oldest first. Any thread. May block.
   [[nodiscard]] std::vector<std::string> dates() const;
-  /// A file that cannot be read is set aside as "….damaged", with a warning. Any thread. May block.
+  /// A file without counts is set aside as "….damaged", with a warning. Throws InputError for one
+  /// that cannot be opened now. Any thread. May block.
   [[nodiscard]] DayCounts day(const std::string& date) const;
 
  private:

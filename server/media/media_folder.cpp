@@ -101,7 +101,8 @@ std::vector<MediaFile> MediaFolder::list() const {
 }
 
 bool MediaFolder::save(const std::string& name, std::string_view content,
-                       const MayReplace& may_replace) const {
+                       const MayReplace& may_replace,
+                       const std::function<bool()>& somebody_waits) const {
   check_media(name, content);
   std::error_code error;
   fs::create_directory(path_, error);
@@ -112,7 +113,7 @@ bool MediaFolder::save(const std::string& name, std::string_view content,
         "let the operator make it, writable for the server");
   require_room(name, content.size());
   Replacement fresh(path_ / name, content, by_hand);  // this may take long, and without the lock
-  const FileLock lock = lock_for_saving(path_.parent_path());
+  const FileLock lock = lock_for_saving(path_, save_patience, somebody_waits);
   const std::optional<MediaFile> there = find(name);
   if (!may_replace(there ? there->etag : "")) return false;
   require_room(name, content.size());
@@ -120,13 +121,14 @@ bool MediaFolder::save(const std::string& name, std::string_view content,
   return true;
 }
 
-/// Counts all that lies in the folder, whatever it is, but for files that are being written.
+/// Counts all that lies in the folder, whatever it is, but for the server's own hidden files.
 void MediaFolder::require_room(const std::string& name, std::uint64_t bytes) const {
   std::size_t files = 1;
   std::error_code error;
   for (fs::directory_iterator entry(path_, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().filename() == name || is_name_of_new_file(entry->path())) continue;
+    const std::string other = entry->path().filename().string();
+    if (other == name || other.starts_with('.')) continue;
     std::error_code no_file;
     const std::uint64_t size = entry->file_size(no_file);
     if (!no_file) bytes += size;

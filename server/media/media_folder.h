@@ -43,11 +43,12 @@ class MediaFolder {
   using MayReplace = std::function<bool(const std::string& etag)>;
   /// Adds or replaces a file that check_media() accepts. Makes the folder if it is missing. Servers
   /// that share a folder ask `may_replace` and replace the file one after the other. Returns false
-  /// where it may not. Throws FolderBusy, and InputError if the folder is full or cannot be
-  /// written.
+  /// where it may not. Throws FolderBusy, at the latest when nobody waits any more, and InputError
+  /// if the folder is full or cannot be written.
   bool save(
       const std::string& name, std::string_view content,
-      const MayReplace& may_replace = [](const std::string&) { return true; }) const;
+      const MayReplace& may_replace = [](const std::string&) { return true; },
+      const std::function<bool()>& somebody_waits = [] { return true; }) const;
 
  private:
   void require_room(const std::string& name, std::uint64_t bytes) const;

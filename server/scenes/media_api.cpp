@@ -165,10 +165,10 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::
   const auto write = [folder = *folder, scene_id, name = std::move(name),
                       precondition = Precondition{std::string(request.if_match),
                                                   std::string(request.if_none_match)}](
-                         std::string_view bytes) {
+                         std::string_view bytes, const UploadPlace& of_sender) {
     try {
       const auto may_replace = [&](const std::string& etag) { return precondition.holds(etag); };
-      if (!folder.save(name, bytes, may_replace))
+      if (!folder.save(name, bytes, may_replace, [&] { return !of_sender.abandoned(); }))
         return text_response(412, "412: another file has this name\n");
     } catch (const InputError& error) {
       log_warning({.event = "media_refused", .scene = scene_id},
@@ -188,7 +188,7 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::
   boost::asio::post(
       writer_, [write, answer, content = std::move(content), place = std::move(place)]() mutable {
         HttpResponse response = busy_response("503: the connection is closed\n");
-        if (!place->abandoned()) response = write(content);
+        if (!place->abandoned()) response = write(content, *place);
         std::string().swap(content);  // the place is free before the answer comes
         place.reset();
         answer->set_value(std::move(response));

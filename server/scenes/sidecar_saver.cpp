@@ -132,7 +132,8 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   }
   try {
     Replacement fresh(file, request.json, beside_the_scene);
-    const FileLock lock = lock_for_saving(file.parent_path());
+    const FileLock lock = lock_for_saving(file.parent_path(), save_patience,
+                                          [&] { return !request.place->abandoned(); });
     // Read it once, because somebody may replace it by hand meanwhile.
     const std::optional<std::string> there = sidecar_text(file);
     const std::string current = there ? etag_of(*there) : "";

@@ -124,6 +124,14 @@ TEST_F(ReplaceFile, AFolderIsSavedInByOneAtATime) {
   EXPECT_NO_THROW(lock_for_saving(folder.path(), 0ms));
 }
 
+/// A server that stops, or whose author has gone, waits for no other one.
+TEST_F(ReplaceFile, WaitForALockEndsWithTheNeedForIt) {
+  const FileLock held = lock_for_saving(folder.path());
+  int looks = 0;
+  EXPECT_THROW(lock_for_saving(folder.path(), 24h, [&] { return ++looks < 3; }), FolderBusy);
+  EXPECT_EQ(looks, 3);
+}
+
 TEST_F(ReplaceFile, ALockThatIsALinkIsNotFollowed) {
   fs::create_symlink(folder / "elsewhere", folder / ".catgs-lock");
   EXPECT_THROW(lock_for_saving(folder.path()), InputError);

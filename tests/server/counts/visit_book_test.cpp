@@ -18,6 +18,7 @@
 #include "render_core/base/error.h"
 #include "server/counts/visit_tally.h"
 #include "server/counts/visits_page.h"
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -176,6 +177,16 @@ TEST_F(VisitBookTest, ADayThatCannotBeWrittenWaits) {
   fs::remove_all(file_of(today));
   { const VisitBook book(folder_.path(), counts_); }
   EXPECT_EQ(VisitBook(folder_.path(), counts_).day(today).at("hall").visits, 1u);
+}
+
+TEST_F(VisitBookTest, ADayThatCannotBeOpenedNowIsReadLater) {
+  std::ofstream(file_of(today)) << counts_json({{"hall", {.visits = 1}}});
+  const VisitBook book(folder_.path(), counts_);
+  {
+    const DescriptorLimit none_is_left(next_descriptor());
+    EXPECT_THROW((void)book.day(today), InputError);
+  }
+  EXPECT_EQ(book.day(today).at("hall").visits, 1u);
 }
 
 /// Several visits go on while the clock passes midnight and is set back, and days are written and

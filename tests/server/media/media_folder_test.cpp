@@ -114,6 +114,14 @@ TEST_F(MediaFolderTest, OneOfTwoServersReplacesAFileThatBothHaveSeen) {
   EXPECT_THAT(names(), ElementsAre("a.png"));
 }
 
+/// The operator makes the folder where the server may not write beside the scene.
+TEST_F(MediaFolderTest, NeedsNothingFromTheScenesFolderButItself) {
+  fs::create_directories(folder_ / "hall.media");
+  fs::create_directory(folder_ / ".catgs-lock");  // root may write everywhere, but no lock there
+  EXPECT_EQ(mistake("a.png", png_file()), "");
+  EXPECT_THAT(names(), ElementsAre("a.png"));
+}
+
 TEST_F(MediaFolderTest, RefusesWhatIsNotWhatItSaysBeforeItMakesAFolder) {
   EXPECT_THAT(mistake("a.png", "<svg/>"), HasSubstr("is of no format"));
   EXPECT_THAT(mistake("../a.png", png_file()), HasSubstr("no name"));
