@@ -24,15 +24,16 @@ void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
   table_.reset();
   watch_->look(std::move(lookout));
   if (request.waits_for_pages) tree_.settle(*watch_);
-  changes_ = watch_->changes();
+  changes_ = watch_->progress().changes;
   table_ = tree_.table();
   now_s_ = tree_.now_s();
 }
 
 void PagedFrame::end(FrameStats& stats) {
   if (!keeps_pages_) table_.reset();
-  stats.missing_pages = watch_->missing();
-  stats.coarsest_px = watch_->coarsest_px();
+  const Watch::Progress progress = watch_->progress();
+  stats.missing_pages = progress.missing;
+  stats.coarsest_px = progress.coarsest_px;
   stats.settled = !watch_->waits(tree_.now_s());
 }
 

@@ -73,7 +73,7 @@ PageFigures PagedTree::figures() const {
                       .slots = pool_->slots(),
                       .free_slots = pool_->free()->count(),
                       .pool_bytes = pool_->bytes()};
-  for (const auto& watch : watches()) figures.missing += watch->missing();
+  for (const auto& watch : watches()) figures.missing += watch->progress().missing;
   const std::lock_guard lock(mutex_);
   figures.in_memory = static_cast<std::uint32_t>(table_->size());
   figures.loaded = loaded_;

@@ -36,11 +36,11 @@ Watch::Numbered Watch::lookout() const {
 void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double now_s) {
   const std::lock_guard lock(mutex_);
   turned_ = number;
-  missing_ = static_cast<std::uint32_t>(cut.missing.size());
-  coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
+  progress_.missing = static_cast<std::uint32_t>(cut.missing.size());
+  progress_.coarsest_px = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
   changing_ = changes;
   if (!changes) return;
-  ++changes_;
+  ++progress_.changes;
   if (!lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
 }
 
@@ -49,19 +49,9 @@ bool Watch::waits(double now_s) const {
   return turned_ != number_ || changing_ || now_s < blends_until_s_;
 }
 
-std::uint64_t Watch::changes() const {
+Watch::Progress Watch::progress() const {
   const std::lock_guard lock(mutex_);
-  return changes_;
-}
-
-std::uint32_t Watch::missing() const {
-  const std::lock_guard lock(mutex_);
-  return missing_;
-}
-
-float Watch::coarsest_px() const {
-  const std::lock_guard lock(mutex_);
-  return coarsest_px_;
+  return progress_;
 }
 
 }  // namespace catgs

@@ -42,12 +42,12 @@ class Watch {
   /// Whether the next frame for the same lookout may look better than one at `now_s`, in the pool's
   /// time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
-  /// Number of turns that began or continued a change of its cuts.
-  [[nodiscard]] std::uint64_t changes() const;
-  /// Number of pages that were wanted but not resident at the pool's last update.
-  [[nodiscard]] std::uint32_t missing() const;
-  /// The largest error caused by missing pages, px.
-  [[nodiscard]] float coarsest_px() const;
+  struct Progress {
+    std::uint64_t changes = 0;  // turns that began or continued a change of its cuts
+    std::uint32_t missing = 0;  // pages that were wanted but not resident at the last turn
+    float coarsest_px = 0.0f;   // the largest error that missing pages cause
+  };
+  [[nodiscard]] Progress progress() const;
 
  private:
   const std::function<void()> wake_;
@@ -55,10 +55,8 @@ class Watch {
   Lookout lookout_;
   std::uint64_t number_ = 0, turned_ = 0;  // of lookout_, and of the last one that was looked at
   bool changing_ = false;
-  std::uint64_t changes_ = 0;
   double blends_until_s_ = 0.0;
-  std::uint32_t missing_ = 0;
-  float coarsest_px_ = 0.0f;
+  Progress progress_;
 };
 
 }  // namespace catgs
