@@ -1,11 +1,11 @@
 // Real files from the shared folder; skipped where it is absent.
-#include <cstdlib>
 #include <tuple>
 
 #include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/shared_folder.h"
 
 namespace catgs::test {
 namespace {
@@ -13,10 +13,7 @@ namespace {
 class SharedScenes : public ::testing::Test {
  protected:
   void SetUp() override {
-    const char* set = std::getenv("CATGS_SHARED_DIR");
-    scenes_ = std::filesystem::path(set ? set : CATGS_SOURCE_DIR "/../shared") / "scenes";
-    if (!std::filesystem::is_directory(scenes_))
-      GTEST_SKIP() << "no folder " << scenes_ << "; set CATGS_SHARED_DIR";
+    if (scenes_.empty()) GTEST_SKIP() << "no shared folder scenes";
   }
 
   static void expect_sound(const Scene& scene) {
@@ -30,7 +27,7 @@ class SharedScenes : public ::testing::Test {
     EXPECT_LT(grid.depth_around(eye), 0.2f) << "the first pose is inside of something";
   }
 
-  std::filesystem::path scenes_;
+  const std::filesystem::path scenes_ = shared_folder("scenes");
 };
 
 TEST_F(SharedScenes, SogVersion2Zip) {
