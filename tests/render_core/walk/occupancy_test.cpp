@@ -83,7 +83,7 @@ TEST(Occupancy, GaussiansBeyondTheGridAreIgnored) {
   EXPECT_EQ(occupancy.bytes(), before);
 }
 
-TEST(Occupancy, DependsNotOnTheThreads) {
+TEST(Occupancy, IsTheSameForAnyNumberOfThreads) {
   const GaussianCloud cloud = test::room(1.0f);
   std::vector<walk::Run> runs[2];
   for (const int threads : {1, 3}) {
