@@ -83,15 +83,15 @@ PageFigures PagedTree::figures() const {
 std::span<const PagedTree::Seen> PagedTree::look() {
   seen_.clear();
   for (auto& watch : watches()) {
-    const auto [lookout, number] = watch->lookout();
+    const auto [demand, number] = watch->demand();
     if (number == 0) continue;  // it has not looked yet
     Cut cut =
-        table_->cut(lookout.cameras, lookout.detail_px, std::numeric_limits<double>::infinity());
+        table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity());
     // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
       return broken_.contains(shape().family_of(use.page));
     });
-    seen_.push_back({std::move(watch), number, lookout.at_once, std::move(cut)});
+    seen_.push_back({std::move(watch), number, demand.at_once, std::move(cut)});
   }
   return seen_;
 }

@@ -13,24 +13,24 @@ bool same(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-bool Lookout::operator==(const Lookout& other) const {
+bool ViewDemand::operator==(const ViewDemand& other) const {
   return detail_px == other.detail_px && at_once == other.at_once &&
          std::ranges::equal(cameras, other.cameras, same);
 }
 
-void Watch::look(Lookout lookout) {
+void Watch::look(ViewDemand demand) {
   {
     const std::lock_guard lock(mutex_);
-    if (number_ > 0 && lookout == lookout_) return;
-    lookout_ = std::move(lookout);
+    if (number_ > 0 && demand == demand_) return;
+    demand_ = std::move(demand);
     ++number_;
   }
   wake_();
 }
 
-Watch::Numbered Watch::lookout() const {
+Watch::Numbered Watch::demand() const {
   const std::lock_guard lock(mutex_);
-  return {lookout_, number_};
+  return {demand_, number_};
 }
 
 void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double now_s) {
@@ -41,7 +41,7 @@ void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double no
   changing_ = changes;
   if (!changes) return;
   ++progress_.changes;
-  if (!lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
+  if (!demand_.at_once) blends_until_s_ = now_s + all_shown_s;
 }
 
 bool Watch::waits(double now_s) const {

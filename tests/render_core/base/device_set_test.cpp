@@ -16,20 +16,20 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Pair;
 
-TEST(DeviceSet, PlacesGoWhereTheFewestAre) {
+TEST(DeviceSet, SlotsAreTakenWhereTheFewestAre) {
   const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
   const std::vector<int> devices = {2, 0, 5};
-  std::vector<std::optional<DeviceSet::Place>> places;
+  std::vector<std::optional<DeviceSet::Slot>> slots;
   std::vector<int> taken;
   for (int i = 0; i < 7; ++i) {
-    places.emplace_back(set->take(devices));
-    taken.push_back(places.back()->device());
+    slots.emplace_back(set->take(devices));
+    taken.push_back(slots.back()->device());
   }
   EXPECT_THAT(taken, ElementsAre(2, 0, 5, 2, 0, 5, 2));
   EXPECT_THAT(set->views(), ElementsAre(Pair(0, 2), Pair(2, 3), Pair(5, 2)));
 
-  places[1].reset();
-  places[4].reset();  // device 0 is empty
+  slots[1].reset();
+  slots[4].reset();  // device 0 is empty
   EXPECT_EQ(set->take(devices).device(), 0);
   EXPECT_THAT(set->views(), ElementsAre(Pair(0, 0), Pair(2, 3), Pair(5, 2)));
 }
@@ -42,13 +42,13 @@ TEST(DeviceSet, RenderersOfSomeDevicesSeeTheViewsOfOthers) {
   EXPECT_EQ(d.device(), 0);
 }
 
-TEST(DeviceSet, PlacesGoWhereTheLeastWorkIsMeasured) {
+TEST(DeviceSet, SlotsAreTakenWhereTheLeastWorkIsMeasured) {
   const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
   const std::vector<int> devices = {0, 1};
-  std::vector<DeviceSet::Place> places;
+  std::vector<DeviceSet::Slot> slots;
   const auto take = [&] {
-    places.push_back(set->take(devices));
-    return places.back().device();
+    slots.push_back(set->take(devices));
+    return slots.back().device();
   };
   for (int i = 0; i < 4; ++i) (void)take();
   set->set_loads({{0, 0.75}, {1, 0.25}});  // 0.25 a View in the mean
@@ -71,13 +71,13 @@ TEST(DeviceSet, UnmeasuredCostsAreForgottenWithTheirView) {
   for (int i = 0; i < 9; ++i) EXPECT_EQ(set->take(devices).device(), 1) << "each has left again";
 }
 
-TEST(DeviceSet, APlaceOutlivesItsSetAndMovesWithItsView) {
+TEST(DeviceSet, ASlotOutlivesItsSetAndMovesWithItsView) {
   auto set = std::make_shared<DeviceSet>();
   const std::vector<int> devices = {0};
-  std::optional<DeviceSet::Place> moved;
+  std::optional<DeviceSet::Slot> moved;
   {
-    DeviceSet::Place place = set->take(devices);
-    moved.emplace(std::move(place));
+    DeviceSet::Slot slot = set->take(devices);
+    moved.emplace(std::move(slot));
   }
   EXPECT_THAT(set->views(), ElementsAre(Pair(0, 1)));
   const std::weak_ptr<DeviceSet> watched = set;
@@ -91,7 +91,7 @@ TEST(DeviceSet, ListsDevicesWithoutViews) {
   const auto set = std::make_shared<DeviceSet>();
   EXPECT_THAT(set->views(), IsEmpty());
   const std::vector<int> devices = {3};
-  const auto place = set->take(devices);
+  const auto slot = set->take(devices);
   set->add(3);
   set->add(4);
   EXPECT_THAT(set->views(), ElementsAre(Pair(3, 1), Pair(4, 0)));
@@ -100,7 +100,7 @@ TEST(DeviceSet, ListsDevicesWithoutViews) {
 TEST(DeviceSet, EveryThreadGivesBackWhatItTook) {
   const auto set = std::make_shared<DeviceSet>(std::vector<int>{});
   const std::vector<int> devices = {0, 1};
-  std::vector<DeviceSet::Place> kept;
+  std::vector<DeviceSet::Slot> kept;
   kept.push_back(set->take(devices));
   {
     std::vector<std::jthread> threads;
