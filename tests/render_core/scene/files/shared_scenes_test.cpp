@@ -30,20 +30,17 @@ class SharedScenes : public ::testing::Test {
   const std::filesystem::path scenes_ = shared_folder("scenes");
 };
 
-TEST_F(SharedScenes, SogVersion2Zip) {
-  const Scene scene = load_scene(scenes_ / "skull.sog");
-  EXPECT_EQ(scene.format, "sog v2 (zip)");
-  EXPECT_EQ(scene.report.read, 94936u);
-  EXPECT_EQ(scene.cloud.sh_degree, 3);
-  expect_sound(scene);
-}
-
-TEST_F(SharedScenes, CompressedPly) {
-  const Scene scene = load_scene(scenes_ / "guitar.compressed.ply");
-  EXPECT_EQ(scene.format, "compressed ply");
-  EXPECT_EQ(scene.report.read, 90854u);
-  EXPECT_EQ(scene.cloud.sh_degree, 0);
-  expect_sound(scene);
+TEST_F(SharedScenes, SingleFiles) {
+  const std::array<std::tuple<const char*, const char*, std::size_t, int>, 2> files = {
+      {{"skull.sog", "sog v2 (zip)", 94936, 3},
+       {"guitar.compressed.ply", "compressed ply", 90854, 0}}};
+  for (const auto& [file, format, gaussians, sh_degree] : files) {
+    const Scene scene = load_scene(scenes_ / file);
+    EXPECT_EQ(scene.format, format);
+    EXPECT_EQ(scene.report.read, gaussians);
+    EXPECT_EQ(scene.cloud.sh_degree, sh_degree);
+    expect_sound(scene);
+  }
 }
 
 TEST_F(SharedScenes, StreamedSogLevels) {
