@@ -43,7 +43,7 @@ void DeviceSet::give_back(int device, std::uint64_t measurement) {
   if (measurement == measurements_) --views_since_[device];
 }
 
-DeviceSet::Place DeviceSet::take(std::span<const int> devices) {
+DeviceSet::Slot DeviceSet::take(std::span<const int> devices) {
   assert(!devices.empty());
   const std::lock_guard lock(mutex_);
   const auto load = [this](int index) {

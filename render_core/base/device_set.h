@@ -24,14 +24,14 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   /// The wanted ones of the devices 0 to count - 1. Throws InputError when one is missing.
   [[nodiscard]] std::vector<int> among(int count) const;
 
-  /// A View's place on a device; its destructor gives the place back.
-  class Place {
+  /// A View's slot on a device; its destructor gives it back.
+  class Slot {
    public:
-    Place(int device, std::function<void()> give_back)
+    Slot(int device, std::function<void()> give_back)
         : device_(device), give_back_(std::move(give_back)) {}
-    Place(Place&& other) noexcept
+    Slot(Slot&& other) noexcept
         : device_(other.device_), give_back_(std::exchange(other.give_back_, nullptr)) {}
-    ~Place() {
+    ~Slot() {
       if (give_back_) give_back_();
     }
     [[nodiscard]] int device() const { return device_; }
@@ -40,10 +40,10 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
     int device_;
     std::function<void()> give_back_;  // empty: moved from
   };
-  /// A place on the least loaded of `devices` (not empty). A View without a measured load counts as
+  /// A slot on the least loaded of `devices` (not empty). A View without a measured load counts as
   /// much as the average View. Without set_loads() the choice is therefore the device with the
   /// fewest Views. Equal loads are decided by the fewest Views, then by the order of `devices`.
-  [[nodiscard]] Place take(std::span<const int> devices);
+  [[nodiscard]] Slot take(std::span<const int> devices);
   /// Sets the measured load of each device: the share of its time that its Views kept it busy
   /// lately, 0.5 for half. Devices that are not named count as idle.
   void set_loads(std::map<int, double> loads);
@@ -54,7 +54,7 @@ class DeviceSet : public std::enable_shared_from_this<DeviceSet> {
   [[nodiscard]] std::map<int, int> views() const;
 
  private:
-  /// Ends a Place on `device` that was taken after so many set_loads().
+  /// Ends a Slot on `device` that was taken after so many set_loads().
   void give_back(int device, std::uint64_t measurement);
 
   const std::vector<int> wanted_;

@@ -29,14 +29,14 @@ struct Device {
   std::shared_ptr<const DeviceScene> scene;
 };
 
-/// A View and its place on a device.
-class PlacedView final : public View {
+/// A View and its slot on a device.
+class ViewInSlot final : public View {
  public:
-  PlacedView(const Device& device, DeviceSet::Place place, const ViewSettings& settings)
-      : place_(std::move(place)), view_(std::in_place, device.scene, device.index, settings) {}
-  ~PlacedView() override {
+  ViewInSlot(const Device& device, DeviceSet::Slot slot, const ViewSettings& settings)
+      : slot_(std::move(slot)), view_(std::in_place, device.scene, device.index, settings) {}
+  ~ViewInSlot() override {
     // Freeing creates a context on the current device, which must not be one that nobody selected.
-    (void)cudaSetDevice(place_.device());
+    (void)cudaSetDevice(slot_.device());
     view_.reset();
   }
 
@@ -47,10 +47,10 @@ class PlacedView final : public View {
     return view_->tile_loads();
   }
   [[nodiscard]] std::size_t memory_bytes() const override { return view_->memory_bytes(); }
-  [[nodiscard]] std::optional<int> device() const override { return place_.device(); }
+  [[nodiscard]] std::optional<int> device() const override { return slot_.device(); }
 
  private:
-  DeviceSet::Place place_;
+  DeviceSet::Slot slot_;
   std::optional<CudaView> view_;
 };
 
@@ -94,19 +94,19 @@ class CudaRenderer final : public Renderer {
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     std::vector<int> candidates;
     for (const Device& device : devices_) candidates.push_back(device.index);
-    return place_view(*set_, std::move(candidates), [&](DeviceSet::Place place) {
-      return make_view_at(std::move(place), settings);
+    return place_view(*set_, std::move(candidates), [&](DeviceSet::Slot slot) {
+      return make_view_at(std::move(slot), settings);
     });
   }
 
  private:
-  [[nodiscard]] std::unique_ptr<View> make_view_at(DeviceSet::Place place,
+  [[nodiscard]] std::unique_ptr<View> make_view_at(DeviceSet::Slot slot,
                                                    const ViewSettings& settings) const {
     const auto device =
         std::find_if(devices_.begin(), devices_.end(),
-                     [&](const Device& candidate) { return candidate.index == place.device(); });
+                     [&](const Device& candidate) { return candidate.index == slot.device(); });
     check(cudaSetDevice(device->index), "device");
-    return std::make_unique<PlacedView>(*device, std::move(place), settings);
+    return std::make_unique<ViewInSlot>(*device, std::move(slot), settings);
   }
 
   std::vector<Device> devices_;
@@ -156,7 +156,7 @@ Device open_device(const MakeScene& make, int index) {
     check(cudaGetDeviceProperties(&properties, index), "device properties");
     use_device(flag, index, properties);
     const auto free_there = [index](const DeviceScene* scene) {
-      (void)cudaSetDevice(index);  // see ~PlacedView()
+      (void)cudaSetDevice(index);  // see ~ViewInSlot()
       delete scene;
     };
     return {index, properties.name, {make(index), free_there}};

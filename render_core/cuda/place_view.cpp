@@ -10,14 +10,14 @@ namespace catgs {
 
 std::unique_ptr<View> place_view(
     DeviceSet& set, std::vector<int> devices,
-    const std::function<std::unique_ptr<View>(DeviceSet::Place place)>& make) {
+    const std::function<std::unique_ptr<View>(DeviceSet::Slot slot)>& make) {
   assert(!devices.empty());
   std::optional<DeviceError> full;
   for (;;) {
-    DeviceSet::Place place = set.take(devices);
-    const int index = place.device();
+    DeviceSet::Slot slot = set.take(devices);
+    const int index = slot.device();
     try {
-      return make(std::move(place));
+      return make(std::move(slot));
     } catch (const DeviceError& error) {
       if (error.status_code() == RenderStatus::Code::out_of_memory) full = error;
       std::erase(devices, index);

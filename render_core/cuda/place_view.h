@@ -15,6 +15,6 @@ namespace catgs {
 /// serves others; otherwise throws the last error.
 std::unique_ptr<View> place_view(
     DeviceSet& set, std::vector<int> devices,
-    const std::function<std::unique_ptr<View>(DeviceSet::Place place)>& make);
+    const std::function<std::unique_ptr<View>(DeviceSet::Slot slot)>& make);
 
 }  // namespace catgs

@@ -16,23 +16,24 @@ PagedFrame::PagedFrame(PagedTree& tree, const ViewSettings& settings)
 void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
   cameras_ = {request.camera};
   if (plan.window > 0) cameras_.push_back(plan.window_end);
-  Lookout lookout{cameras_, request.detail_px, request.waits_for_pages};
+  ViewDemand demand{cameras_, request.detail_px, request.waits_for_pages};
   if (request.soon) {
-    lookout.cameras.push_back(request.camera);
-    lookout.cameras.back().world_from_camera = *request.soon;
+    demand.cameras.push_back(request.camera);
+    demand.cameras.back().world_from_camera = *request.soon;
   }
   table_.reset();
-  watch_->look(std::move(lookout));
+  watch_->look(std::move(demand));
   if (request.waits_for_pages) tree_.settle(*watch_);
-  changes_ = watch_->changes();
+  changes_ = watch_->progress().changes;
   table_ = tree_.table();
   now_s_ = tree_.now_s();
 }
 
 void PagedFrame::end(FrameStats& stats) {
   if (!keeps_pages_) table_.reset();
-  stats.missing_pages = watch_->missing();
-  stats.coarsest_px = watch_->coarsest_px();
+  const Watch::Progress progress = watch_->progress();
+  stats.missing_pages = progress.missing;
+  stats.coarsest_px = progress.coarsest_px;
   stats.settled = !watch_->waits(tree_.now_s());
 }
 

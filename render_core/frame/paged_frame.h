@@ -30,7 +30,7 @@ class PagedFrame {
   /// sub-frame follows may go from now on.
   void end(FrameStats& stats);
   /// See View::outdated().
-  [[nodiscard]] bool outdated() const { return watch_->changes() != changes_; }
+  [[nodiscard]] bool outdated() const { return watch_->progress().changes != changes_; }
 
  private:
   PagedTree& tree_;

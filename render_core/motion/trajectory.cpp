@@ -20,7 +20,6 @@ namespace {
 constexpr std::size_t max_line_bytes = 1024;
 constexpr std::size_t max_poses = 10'000'000;  // a day at 115 Hz
 constexpr double max_time_s = 9e9;             // microseconds stay exact in a double
-constexpr double max_coordinate = 1e9;         // as on the wire: a float is exact enough
 constexpr double norm_tolerance = 0.1;         // files carry three digits or more
 constexpr std::string_view tum_format = "timestamp_s tx ty tz qx qy qz qw";
 

@@ -120,7 +120,7 @@ void Occupancy::add(const GaussianCloud& part, ThreadPool& pool,
       for (const Chunk& chunk : chunks) take(chunk.shares[shard], blocks_of_shard_[shard]);
     });
     if (std::ranges::max(blocks_of_shard_) > most_blocks_of_shard_)
-      throw InputError("the scene", "", "fills too many cells for one to find ground in it",
+      throw InputError("the scene", "", "fills too many cells to find its walkable area",
                        "with a larger --eye-height, cells are larger");
   }
 }

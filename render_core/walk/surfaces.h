@@ -14,7 +14,7 @@
 
 namespace catgs::walk {
 
-/// The tops of all runs of an occupancy, and how they hang together.
+/// The tops of all runs of an occupancy, and how they are connected.
 class Surfaces {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -37,7 +37,7 @@ class Surfaces {
   [[nodiscard]] std::uint32_t next(std::size_t i, int direction) const;
   /// The runs of a column of the grid, from below.
   [[nodiscard]] std::span<const Run> runs_at(const glm::ivec2& column) const;
-  /// Marks the open surfaces that hang together all around within the body's
+  /// Marks the open surfaces that are connected all around within the body's
   /// radius.
   [[nodiscard]] std::vector<char> with_room(ThreadPool& pool) const;
 

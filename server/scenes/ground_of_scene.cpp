@@ -14,8 +14,8 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/scene_by_parts.h"
 #include "render_core/walk/eye_height.h"
-#include "render_core/walk/find_ground.h"
 #include "render_core/walk/walk_file.h"
+#include "render_core/walk/walkable_area.h"
 #include "server/access/signed_token.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_ids.h"
@@ -111,8 +111,9 @@ std::string compute_ground(const GroundSource& source, int threads,
     begin(known_of_scene([&] { return eye_height_of(source, *scene.sample); }));
     scene.each(take);
   }
-  return walk::pack(known_of_scene(
-      [&] { return walk::find_ground(*occupancy, {}, source.start, spec, *pool, progress); }));
+  return walk::pack(known_of_scene([&] {
+    return walk::find_walkable_area(*occupancy, {}, source.start, spec, *pool, progress);
+  }));
 }
 
 std::string ground_name(const GroundSource& source) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Pipeline::catgs of any core against its exact pipeline at the same poses.
+// Pipeline::catgs against its exact pipeline at the same poses.
 
 #include <cmath>
 #include <cstdint>
@@ -101,53 +101,5 @@ struct PathQuality {
     EXPECT_GT(left_out, 0);
   }
 };
-
-// What each core must keep to.
-
-inline void expect_a_wall_to_hide(Renderer& renderer) {
-  const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
-  const FrameRequest request = request_at({});
-  const Rendered expected = render_in(*exact, request);
-  EXPECT_EQ(render_in(*view, request).stats.visible, expected.stats.visible) << "nothing is known";
-  for (int frame = 0; frame < 3; ++frame) {
-    const Rendered drawn = render_in(*view, request);
-    EXPECT_LT(2 * drawn.stats.visible, expected.stats.visible);
-    EXPECT_LT(2 * drawn.stats.list_entries, expected.stats.list_entries);
-    EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
-  }
-}
-
-inline void expect_a_leap_to_hide_nothing(Renderer& renderer) {
-  const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
-  // Beyond the wall, to the side, and the other way round.
-  const Pose leaps[] = {
-      {{0, 0, 5}, {1, 0, 0, 0}}, {{30, 0, 0}, {1, 0, 0, 0}}, {{0, 0, 40}, {0, 0, 1, 0}}};
-  for (const Pose& leap : leaps) {
-    for (int frame = 0; frame < 2; ++frame) render_in(*view, request_at({}));
-    const Rendered drawn = render_in(*view, request_at(leap));
-    const Rendered expected = render_in(*exact, request_at(leap));
-    EXPECT_EQ(drawn.stats.visible, expected.stats.visible);
-    EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
-  }
-}
-
-/// `renderer`: of plate_before_pattern(). The camera goes along the plate and looks past its edge.
-inline void expect_what_comes_out_behind_an_edge(Renderer& renderer) {
-  for (const float step : {0.005f, 0.02f, 0.05f, -0.02f}) {
-    SCOPED_TRACE(step);
-    const auto view = renderer.make_view(catgs_settings), exact = renderer.make_view({});
-    PathQuality quality;
-    std::uint32_t hidden = 0;
-    for (int k = 0; k < 20; ++k) {
-      const FrameRequest request = request_at({{step * static_cast<float>(k), 0, 0}, {1, 0, 0, 0}});
-      const Rendered drawn = render_in(*view, request), expected = render_in(*exact, request);
-      hidden += expected.stats.visible - drawn.stats.visible;
-      quality.add(drawn, expected, request.camera.size_px);
-    }
-    EXPECT_GE(quality.worst_frame, 45.0);
-    EXPECT_GE(quality.worst_block, 30.0);
-    EXPECT_GT(hidden, 0u);
-  }
-}
 
 }  // namespace catgs::test

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -10,6 +11,11 @@
 #include <stdlib.h>
 
 namespace catgs::test {
+
+inline std::string content_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 /// A new, empty folder, removed at the end with all it holds. The system chooses its name: CTest
 /// runs cases side by side, and other users and build folders run the same ones.

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "render_core/math/camera.h"
 #include "render_core/math/constants.h"
 #include "render_core/scene/activations.h"
 #include "render_core/scene/analysis/robust_bounds.h"
@@ -22,7 +23,6 @@ namespace {
 constexpr float least_opacity = static_cast<float>(alpha_min);
 // A file that stores the logit returns slightly less than was written.
 constexpr float invisible_opacity = least_opacity * (1.0f - 1e-5f);
-constexpr float absurd_value = 1e9f;
 constexpr float absurd_diagonals = 1e4f;
 constexpr float min_scale = 1e-10f;
 
@@ -34,7 +34,7 @@ bool finite(const glm::vec3& v) {
 
 bool contains(const SaneReach& reach, const glm::vec3& mean, float largest_scale) {
   const glm::vec3 m = glm::abs(mean);
-  if (std::max({m.x, m.y, m.z, largest_scale}) > absurd_value) return false;
+  if (std::max({m.x, m.y, m.z, largest_scale}) > max_coordinate) return false;
   return reach.radius == 0.0f ||
          (glm::distance(mean, reach.centre) <= reach.radius && largest_scale <= reach.radius);
 }

@@ -166,23 +166,21 @@ GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& heade
   cloud.resize(layout.vertex->count, degree);
   cloud.model = header.model.value_or(SplatModel::standard);
 
-  const auto read_rows = [&](const PlyElement& element, std::size_t begin, std::size_t end) {
-    std::vector<std::byte> bytes((end - begin) * element.row_bytes);
-    file.read(element.data_offset + begin * element.row_bytes, bytes);
-    return bytes;
+  const auto rows_of = [&](const PlyElement& element, std::size_t begin, std::size_t end) {
+    return read_rows(file, element.data_offset, element.row_bytes, {}, begin, end);
   };
   const std::size_t rest = cloud.sh_count() - 1;
   context.for_blocks(
       cloud.size(), block_chunks * chunk_size, [&](std::size_t begin, std::size_t end) {
         const std::size_t first_chunk = begin / chunk_size;
         const auto chunks =
-            read_rows(*layout.chunk, first_chunk, (end + chunk_size - 1) / chunk_size);
-        const auto vertices = read_rows(*layout.vertex, begin, end);
+            rows_of(*layout.chunk, first_chunk, (end + chunk_size - 1) / chunk_size);
+        const auto vertices = rows_of(*layout.vertex, begin, end);
         for (std::size_t i = begin; i < end; ++i)
           store(layout, chunks.data() + (i / chunk_size - first_chunk) * layout.chunk->row_bytes,
                 vertices.data() + (i - begin) * layout.vertex->row_bytes, cloud, i);
         if (rest == 0) return;
-        const auto sh_rows = read_rows(*layout.sh, begin, end);
+        const auto sh_rows = rows_of(*layout.sh, begin, end);
         for (std::size_t i = begin; i < end; ++i) {
           const std::byte* row = sh_rows.data() + (i - begin) * layout.sh->row_bytes;
           glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count() + 1;

@@ -75,11 +75,7 @@ DetailChoice within_budget(const DetailTree& tree, const std::string& file, std:
   const std::size_t room = budget > always ? budget - always : 0;
   int level = tree.levels() - 1;
   DetailChoice choice = shown(tree, refined_at(tree, level));
-  if (choice.count > room)
-    throw InputError(
-        file, "Gaussian budget",
-        fmt::format("{} is less than the {} of the coarsest level", budget, choice.count + always),
-        "raise the budget");
+  if (choice.count > room) fail_budget(file, budget, choice.count + always);
   for (; level > 0; --level) {
     DetailChoice finer = shown(tree, refined_at(tree, level - 1));
     if (finer.count > room) break;
@@ -113,16 +109,27 @@ int DetailTree::levels() const {
   return deepest + 1;
 }
 
+void require_level(const std::string& file, int levels, std::optional<int> level,
+                   std::optional<std::size_t> budget) {
+  if (level && budget)
+    throw InputError(file, "", "a level and a Gaussian budget were both given", "give one");
+  if (level && (*level < 0 || *level >= levels))
+    throw InputError(file, "level of detail",
+                     fmt::format("there is no level {}; 0 (finest) to {} are", *level, levels - 1));
+}
+
+void fail_budget(const std::string& file, std::size_t budget, std::size_t coarsest) {
+  throw InputError(file, "Gaussian budget",
+                   fmt::format("{} is less than the {} of the coarsest level", budget, coarsest),
+                   "raise the budget");
+}
+
 DetailChoice choose_detail(const DetailTree& tree, const std::string& file,
                            std::optional<int> level, std::optional<std::size_t> budget,
                            std::size_t always) {
-  if (level && budget)
-    throw InputError(file, "", "a level and a Gaussian budget were both given", "give one");
-  if (budget) return within_budget(tree, file, *budget, always);
   const int levels = tree.levels(), wanted = level.value_or(0);
-  if (wanted < 0 || wanted >= levels)
-    throw InputError(file, "level of detail",
-                     fmt::format("there is no level {}; 0 (finest) to {} are", wanted, levels - 1));
+  require_level(file, levels, level, budget);
+  if (budget) return within_budget(tree, file, *budget, always);
   DetailChoice choice = shown(tree, refined_at(tree, wanted));
   choice.text = fmt::format("level {} of 0…{}", wanted, levels - 1);
   return choice;

@@ -38,6 +38,12 @@ struct DetailChoice {
   std::string text;       // for people: "level 2 of 0…6"
 };
 
+/// Throws InputError that names `file` if both are given, or if there is no such level.
+void require_level(const std::string& file, int levels, std::optional<int> level,
+                   std::optional<std::size_t> budget);
+/// Throws InputError: the budget is less than the coarsest level has.
+[[noreturn]] void fail_budget(const std::string& file, std::size_t budget, std::size_t coarsest);
+
 /// Level `level`, or the finest one whose Gaussians fit into `budget`. As many nodes as still fit
 /// then give way to the next finer level, cheapest first. Without both the finest level. `always`:
 /// Gaussians that every level has besides. Throws InputError that names `file`: both are given,

@@ -17,9 +17,8 @@ namespace catgs {
 namespace {
 
 constexpr std::uint64_t max_json_bytes = 16 << 20;
-constexpr std::size_t max_buffers = 256;         // a file of each stays open
-constexpr std::uint64_t max_stride = 252;        // by the specification
-constexpr std::uint32_t glb_magic = 0x46546c67;  // "glTF"
+constexpr std::size_t max_buffers = 256;   // a file of each stays open
+constexpr std::uint64_t max_stride = 252;  // by the specification
 constexpr std::uint32_t json_chunk = 0x4e4f534a, binary_chunk = 0x004e4942;
 constexpr std::size_t glb_header_bytes = 12, chunk_header_bytes = 8;
 
@@ -36,18 +35,26 @@ ChunkHeader read_chunk_header(const ByteSource& file, std::uint64_t at) {
   return {words[0], words[1]};
 }
 
-std::size_t component_bytes(GltfComponent component) {
+/// Calls body(T{}) with the type of the component.
+template <class Body>
+auto with_type(GltfComponent component, const Body& body) {
   switch (component) {
     case GltfComponent::byte:
+      return body(std::int8_t{});
     case GltfComponent::unsigned_byte:
-      return 1;
+      return body(std::uint8_t{});
     case GltfComponent::short_int:
+      return body(std::int16_t{});
     case GltfComponent::unsigned_short:
-      return 2;
+      return body(std::uint16_t{});
     case GltfComponent::float32:
-      return 4;
+      break;
   }
-  return 0;
+  return body(0.0f);
+}
+
+std::size_t component_bytes(GltfComponent component) {
+  return with_type(component, [](auto number) { return sizeof number; });
 }
 
 GltfComponent component_of(const JsonField& field) {
@@ -127,23 +134,7 @@ std::vector<float> GltfAccessor::read(std::size_t begin, std::size_t end) const 
   if (numbers.empty()) return numbers;
   std::vector<std::byte> bytes((end - begin - 1) * stride + columns * component_bytes(component));
   buffer->read(offset + begin * stride, bytes);
-  switch (component) {
-    case GltfComponent::byte:
-      convert<std::int8_t>(bytes.data(), *this, numbers);
-      break;
-    case GltfComponent::unsigned_byte:
-      convert<std::uint8_t>(bytes.data(), *this, numbers);
-      break;
-    case GltfComponent::short_int:
-      convert<std::int16_t>(bytes.data(), *this, numbers);
-      break;
-    case GltfComponent::unsigned_short:
-      convert<std::uint16_t>(bytes.data(), *this, numbers);
-      break;
-    case GltfComponent::float32:
-      convert<float>(bytes.data(), *this, numbers);
-      break;
-  }
+  with_type(component, [&]<class T>(T) { convert<T>(bytes.data(), *this, numbers); });
   return numbers;
 }
 
@@ -174,11 +165,7 @@ std::string file_named_by(std::string_view uri) {
 
 }  // namespace
 
-bool is_glb(const ByteSource& file) {
-  std::uint32_t magic = 0;
-  if (file.size() >= sizeof magic) file.read(0, std::as_writable_bytes(std::span(&magic, 1)));
-  return magic == glb_magic;
-}
+bool is_glb(const ByteSource& file) { return begins_with(file, "glTF"); }
 
 GltfDocument::GltfDocument(const ByteSource& file, const FileSet& beside)
     : name_(file.name()), beside_(beside) {

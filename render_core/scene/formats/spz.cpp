@@ -308,21 +308,11 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes a
   return result;
 }
 
-bool is_gzip(const ByteSource& file) {
-  std::array<std::byte, 2> start;
-  file.read(0, start);
-  return load_as<std::uint16_t>(start.data()) == 0x8b1f;
-}
+bool is_gzip(const ByteSource& file) { return begins_with(file, "\x1f\x8b"); }
 
 }  // namespace
 
-bool is_spz(const ByteSource& file) {
-  if (file.size() < 4) return false;
-  std::array<std::byte, 4> start;
-  file.read(0, start);
-  return load_as<std::uint32_t>(start.data()) == magic ||
-         load_as<std::uint16_t>(start.data()) == 0x8b1f;
-}
+bool is_spz(const ByteSource& file) { return begins_with(file, "NGSP") || is_gzip(file); }
 
 SceneSize read_spz_size(const ByteSource& file) {
   std::array<std::byte, plain_header_bytes> start;

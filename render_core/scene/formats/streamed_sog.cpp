@@ -123,21 +123,11 @@ std::vector<StreamedSogPart> open_parts(const FileSet& folder, const LodTree& tr
 
 LodChoice choose(const LodTree& tree, std::optional<int> level, std::optional<std::size_t> budget,
                  std::size_t environment_count) {
-  if (level && budget)
-    throw InputError(tree.name, "", "a level and a Gaussian budget were both given", "give one");
-  if (!budget) {
-    if (level && (*level < 0 || *level >= tree.levels))
-      throw InputError(
-          tree.name, "level of detail",
-          fmt::format("there is no level {}; 0 (finest) to {} are", *level, tree.levels - 1));
-    return choose_level(tree, level.value_or(0));
-  }
+  require_level(tree.name, tree.levels, level, budget);
+  if (!budget) return choose_level(tree, level.value_or(0));
   const std::size_t room = *budget > environment_count ? *budget - environment_count : 0;
   if (auto choice = choose_within_budget(tree, room)) return *std::move(choice);
-  throw InputError(tree.name, "Gaussian budget",
-                   fmt::format("{} is less than the {} of the coarsest level", *budget,
-                               choose_level(tree, tree.levels - 1).count + environment_count),
-                   "raise the budget");
+  fail_budget(tree.name, *budget, choose_level(tree, tree.levels - 1).count + environment_count);
 }
 
 /// Gaussians that a part has in the scene.

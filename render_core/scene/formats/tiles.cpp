@@ -1,7 +1,6 @@
 #include "render_core/scene/formats/tiles.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <string_view>
@@ -197,12 +196,8 @@ void TilesetReader::read_content(const JsonField& content, std::size_t node, con
 
 Content TilesetReader::read_gltf_content(const std::string& name, const AffineMap& map) const {
   const auto file = files_.open(name);
-  std::array<char, 4> magic{};
-  const auto start = std::span(magic).first(std::min<std::uint64_t>(4, file->size()));
-  file->read(0, std::as_writable_bytes(start));
-  const std::string_view begins(start.data(), start.size());
   for (const std::string_view other : {"b3dm", "i3dm", "pnts", "cmpt", "vctr", "geom", "subt"})
-    if (begins == other)
+    if (begins_with(*file, other))
       throw InputError(file->name(), "", fmt::format("is a tile of the format {}", other),
                        "Gaussians are in glTF tiles");
   return {name, map, read_gltf_size(*file, FilesBelow(files_, fs::path(name).parent_path()))};

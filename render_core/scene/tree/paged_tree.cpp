@@ -73,7 +73,7 @@ PageFigures PagedTree::figures() const {
                       .slots = pool_->slots(),
                       .free_slots = pool_->free()->count(),
                       .pool_bytes = pool_->bytes()};
-  for (const auto& watch : watches()) figures.missing += watch->missing();
+  for (const auto& watch : watches()) figures.missing += watch->progress().missing;
   const std::lock_guard lock(mutex_);
   figures.in_memory = static_cast<std::uint32_t>(table_->size());
   figures.loaded = loaded_;
@@ -83,15 +83,15 @@ PageFigures PagedTree::figures() const {
 std::span<const PagedTree::Seen> PagedTree::look() {
   seen_.clear();
   for (auto& watch : watches()) {
-    const auto [lookout, number] = watch->lookout();
+    const auto [demand, number] = watch->demand();
     if (number == 0) continue;  // it has not looked yet
     Cut cut =
-        table_->cut(lookout.cameras, lookout.detail_px, std::numeric_limits<double>::infinity());
+        table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity());
     // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
       return broken_.contains(shape().family_of(use.page));
     });
-    seen_.push_back({std::move(watch), number, lookout.at_once, std::move(cut)});
+    seen_.push_back({std::move(watch), number, demand.at_once, std::move(cut)});
   }
   return seen_;
 }

@@ -62,7 +62,7 @@ class PagedTree {
   /// The time of PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const { return pool_->now_s(); }
   [[nodiscard]] std::shared_ptr<Watch> watch();
-  /// Reads all that this View's lookout needs and memory has room for, beside the other Views: in
+  /// Reads all that this View's demand needs and memory has room for, beside the other Views: in
   /// PagePool::settling_turns() turns, or as much as they bring.
   void settle(const Watch& watch);
   [[nodiscard]] PageFigures figures() const;
@@ -73,7 +73,7 @@ class PagedTree {
   void open();
   struct Seen {
     std::shared_ptr<Watch> watch;
-    std::uint64_t number;  // of its lookout
+    std::uint64_t number;  // of its demand
     bool at_once;
     Cut cut;  // pages that are only being blended in count as shown
   };

@@ -13,35 +13,35 @@ bool same(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-bool Lookout::operator==(const Lookout& other) const {
+bool ViewDemand::operator==(const ViewDemand& other) const {
   return detail_px == other.detail_px && at_once == other.at_once &&
          std::ranges::equal(cameras, other.cameras, same);
 }
 
-void Watch::look(Lookout lookout) {
+void Watch::look(ViewDemand demand) {
   {
     const std::lock_guard lock(mutex_);
-    if (number_ > 0 && lookout == lookout_) return;
-    lookout_ = std::move(lookout);
+    if (number_ > 0 && demand == demand_) return;
+    demand_ = std::move(demand);
     ++number_;
   }
   wake_();
 }
 
-Watch::Numbered Watch::lookout() const {
+Watch::Numbered Watch::demand() const {
   const std::lock_guard lock(mutex_);
-  return {lookout_, number_};
+  return {demand_, number_};
 }
 
 void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double now_s) {
   const std::lock_guard lock(mutex_);
   turned_ = number;
-  missing_ = static_cast<std::uint32_t>(cut.missing.size());
-  coarsest_px_ = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
+  progress_.missing = static_cast<std::uint32_t>(cut.missing.size());
+  progress_.coarsest_px = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
   changing_ = changes;
   if (!changes) return;
-  ++changes_;
-  if (!lookout_.at_once) blends_until_s_ = now_s + all_shown_s;
+  ++progress_.changes;
+  if (!demand_.at_once) blends_until_s_ = now_s + all_shown_s;
 }
 
 bool Watch::waits(double now_s) const {
@@ -49,19 +49,9 @@ bool Watch::waits(double now_s) const {
   return turned_ != number_ || changing_ || now_s < blends_until_s_;
 }
 
-std::uint64_t Watch::changes() const {
+Watch::Progress Watch::progress() const {
   const std::lock_guard lock(mutex_);
-  return changes_;
-}
-
-std::uint32_t Watch::missing() const {
-  const std::lock_guard lock(mutex_);
-  return missing_;
-}
-
-float Watch::coarsest_px() const {
-  const std::lock_guard lock(mutex_);
-  return coarsest_px_;
+  return progress_;
 }
 
 }  // namespace catgs

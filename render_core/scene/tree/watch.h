@@ -11,12 +11,12 @@
 namespace catgs {
 
 /// The cameras and the detail of a View.
-struct Lookout {
+struct ViewDemand {
   std::vector<Camera> cameras;  // now, and where it may be soon
   float detail_px = 0.0f;
   bool at_once = false;  // pages that come are shown at once, not blended in
 
-  bool operator==(const Lookout& other) const;
+  bool operator==(const ViewDemand& other) const;
 };
 
 /// The link between a View and the pool of pages. Its functions may be called from any thread.
@@ -29,36 +29,34 @@ class Watch {
   Watch& operator=(const Watch&) = delete;
 
   /// Says what the View draws now.
-  void look(Lookout lookout);
-  /// The lookout, and its number.
+  void look(ViewDemand demand);
+  /// The demand, and its number.
   struct Numbered {
-    Lookout lookout;
+    ViewDemand demand;
     std::uint64_t number = 0;
   };
-  [[nodiscard]] Numbered lookout() const;
-  /// A turn of the pool has looked at the lookout with this number. `cut`: as it was before the
+  [[nodiscard]] Numbered demand() const;
+  /// A turn of the pool has looked at the demand with this number. `cut`: as it was before the
   /// turn. `changes`: pages of the cut came or went in the turn, or will in the next ones.
   void turned(std::uint64_t number, const Cut& cut, bool changes, double now_s);
-  /// Whether the next frame for the same lookout may look better than one at `now_s`, in the pool's
+  /// Whether the next frame for the same demand may look better than one at `now_s`, in the pool's
   /// time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
-  /// Number of turns that began or continued a change of its cuts.
-  [[nodiscard]] std::uint64_t changes() const;
-  /// Number of pages that were wanted but not resident at the pool's last update.
-  [[nodiscard]] std::uint32_t missing() const;
-  /// The largest error caused by missing pages, px.
-  [[nodiscard]] float coarsest_px() const;
+  struct Progress {
+    std::uint64_t changes = 0;  // turns that began or continued a change of its cuts
+    std::uint32_t missing = 0;  // pages that were wanted but not resident at the last turn
+    float coarsest_px = 0.0f;   // the largest error that missing pages cause
+  };
+  [[nodiscard]] Progress progress() const;
 
  private:
   const std::function<void()> wake_;
   mutable std::mutex mutex_;  // guards the rest
-  Lookout lookout_;
-  std::uint64_t number_ = 0, turned_ = 0;  // of lookout_, and of the last one that was looked at
+  ViewDemand demand_;
+  std::uint64_t number_ = 0, turned_ = 0;  // of demand_, and of the last one that was looked at
   bool changing_ = false;
-  std::uint64_t changes_ = 0;
   double blends_until_s_ = 0.0;
-  std::uint32_t missing_ = 0;
-  float coarsest_px_ = 0.0f;
+  Progress progress_;
 };
 
 }  // namespace catgs

@@ -16,9 +16,9 @@
 #include "render_core/tools/progress.h"
 #include "render_core/tools/scene_options.h"
 #include "render_core/walk/eye_height.h"
-#include "render_core/walk/find_ground.h"
 #include "render_core/walk/plan.h"
 #include "render_core/walk/walk_file.h"
+#include "render_core/walk/walkable_area.h"
 
 namespace catgs {
 namespace {
@@ -114,7 +114,8 @@ void floors(const FloorsOptions& options, bool quiet) {
     adding_s += seconds_since(adds);
   });
   const auto searches = Clock::now();
-  const walk::WalkMap map = walk::find_ground(occupancy, {}, start, options.scene.path, *pool);
+  const walk::WalkMap map =
+      walk::find_walkable_area(occupancy, {}, start, options.scene.path, *pool);
   const double search_s = seconds_since(searches);
   walk::write_walk_file(map, options.out);
   rusage usage{};

@@ -1,6 +1,5 @@
 #include "render_core/base/new_file.h"
 
-#include <fstream>
 #include <system_error>
 
 #include <gtest/gtest.h>
@@ -20,10 +19,6 @@ using namespace std::chrono_literals;
 
 class NewFileTest : public testing::Test {
  protected:
-  static std::string content(const fs::path& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
   [[nodiscard]] std::ptrdiff_t files() const {
     return std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator());
   }
@@ -37,9 +32,9 @@ TEST_F(NewFileTest, WritersOfOnePathDoNotMeet) {
   first.stream() << "of the first, which is longer";
   second.stream() << "of the second";
   second.finish();
-  EXPECT_EQ(content(path_), "of the second");
+  EXPECT_EQ(test::content_of(path_), "of the second");
   first.finish();
-  EXPECT_EQ(content(path_), "of the first, which is longer");
+  EXPECT_EQ(test::content_of(path_), "of the first, which is longer");
   EXPECT_EQ(files(), 1);
 }
 
@@ -52,9 +47,9 @@ TEST_F(NewFileTest, LinksAndPipesAreReplacedAndNotOpened) {
     file.stream() << "new";
     file.finish();
     EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(folder_ / name))) << name;
-    EXPECT_EQ(content(folder_ / name), "new");
+    EXPECT_EQ(test::content_of(folder_ / name), "new");
   }
-  EXPECT_EQ(content(folder_ / "secret"), "of somebody");
+  EXPECT_EQ(test::content_of(folder_ / "secret"), "of somebody");
 }
 
 TEST_F(NewFileTest, AFolderIsNotReplaced) {

@@ -1,7 +1,6 @@
 // Pipeline::catgs in the CPU core against its exact pipeline at the same poses.
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <ranges>
 #include <string>
@@ -12,11 +11,11 @@
 #include "render_core/cpu/kernels.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/motion/anchor.h"
-#include "render_core/motion/script.h"
 #include "render_core/motion/trajectory.h"
 #include "render_core/synth/synth.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/catgs_views.h"
+#include "tests/support/shared_folder.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
@@ -36,60 +35,26 @@ std::unique_ptr<Renderer> renderer_of(std::shared_ptr<const GaussianCloud> cloud
       .renderer;
 }
 
-class CatgsInTheCity : public testing::Test {
- protected:
-  ThreadPool pool_{2};
-  Scene scene_ = synthesize(SynthKind::city, 20'000, 1, pool_);
-  std::unique_ptr<Renderer> renderer_ =
-      renderer_of(std::make_shared<const GaussianCloud>(scene_.cloud));
-};
-
-TEST_F(CatgsInTheCity, KeepsItsQualityOnScriptedMotion) {
-  for (const std::string script : {"walk", "head", "drone", "orbit"}) {
-    for (const double rate_hz : {30.0, 120.0}) {
-      SCOPED_TRACE(testing::Message() << script << " at " << rate_hz << " Hz");
-      PathQuality quality;
-      quality.follow(
-          *renderer_,
-          resample(make_script({.script = script, .duration_s = 0.6}, scene_.hints), rate_hz));
-      quality.expect_good();
-    }
-  }
-}
-
-TEST_F(CatgsInTheCity, KeepsItsQualityOnRecordedHeads) {
-  const char* shared = std::getenv("CATGS_SHARED_DIR");
-  const auto folder =
-      (shared != nullptr ? std::filesystem::path(shared)
-                         : std::filesystem::path(CATGS_SOURCE_DIR).parent_path() / "shared") /
-      "traces/head";
-  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no folder " << folder;
+TEST(CatgsView, KeepsItsQualityOnRecordedHeads) {
+  const auto folder = test::shared_folder("traces/head");
+  if (folder.empty()) GTEST_SKIP() << "no shared folder traces/head";
+  ThreadPool pool(2);
+  const Scene scene = synthesize(SynthKind::city, 20'000, 1, pool);
+  const auto renderer = renderer_of(std::make_shared<const GaussianCloud>(scene.cloud));
   int traces = 0;
   for (const auto& file : std::filesystem::directory_iterator(folder)) {
     if (file.path().extension() != ".tum") continue;
     SCOPED_TRACE(file.path().filename().string());
-    const Trajectory path = resample(anchored(read_tum(file.path()), scene_.hints), 60.0);
+    const Trajectory path = resample(anchored(read_tum(file.path()), scene.hints), 60.0);
     // A part with much motion in it; all of it would take minutes.
     const auto first = static_cast<std::ptrdiff_t>(std::min<std::size_t>(300, path.size() / 2));
     const auto last = std::min<std::ptrdiff_t>(first + 40, std::ssize(path));
     PathQuality quality;
-    quality.follow(*renderer_, Trajectory(path.begin() + first, path.begin() + last));
+    quality.follow(*renderer, Trajectory(path.begin() + first, path.begin() + last));
     quality.expect_good();
     ++traces;
   }
   EXPECT_GT(traces, 0);
-}
-
-TEST(CatgsView, DoesNotDrawWhatAWallHides) {
-  test::expect_a_wall_to_hide(*renderer_of(wall_before_many()));
-}
-
-TEST(CatgsView, ALeapOfTheCameraHidesNothing) {
-  test::expect_a_leap_to_hide_nothing(*renderer_of(wall_before_many()));
-}
-
-TEST(CatgsView, DrawsWhatComesOutBehindAnEdge) {
-  test::expect_what_comes_out_behind_an_edge(*renderer_of(test::plate_before_pattern()));
 }
 
 TEST(CatgsView, ANewImageSizeHidesNothing) {

@@ -2,7 +2,7 @@
 // that meets them with rays.
 #include <memory>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ std::vector<float> rendered(const GaussianCloud& cloud, const FrameRequest& requ
   return test::render_in(*renderer->make_view({}), request).rgb;
 }
 
-class Models : public ::testing::TestWithParam<std::pair<SplatModel, float>> {};
+class Models : public ::testing::TestWithParam<std::tuple<SplatModel, float>> {};
 
 TEST_P(Models, AreDrawnAsByTheReferenceAtAnyDistance) {
   const auto [model, distance] = GetParam();
@@ -50,15 +50,10 @@ TEST_P(Models, AreDrawnAsByTheReferenceAtAnyDistance) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Distances, Models,
-                         ::testing::Values(std::pair{SplatModel::standard, 4.0f},
-                                           std::pair{SplatModel::standard, 15.0f},
-                                           std::pair{SplatModel::standard, 60.0f},
-                                           std::pair{SplatModel::antialiased, 4.0f},
-                                           std::pair{SplatModel::antialiased, 15.0f},
-                                           std::pair{SplatModel::antialiased, 60.0f},
-                                           std::pair{SplatModel::surfels, 4.0f},
-                                           std::pair{SplatModel::surfels, 15.0f},
-                                           std::pair{SplatModel::surfels, 60.0f}));
+                         ::testing::Combine(::testing::Values(SplatModel::standard,
+                                                              SplatModel::antialiased,
+                                                              SplatModel::surfels),
+                                            ::testing::Values(4.0f, 15.0f, 60.0f)));
 
 struct SurfelView {
   const char* name;

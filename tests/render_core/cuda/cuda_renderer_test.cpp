@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/render_core/cores/tree_views.h"
 #include "tests/render_core/cuda/device.h"
 #include "tests/support/camera_moves.h"
 #include "tests/support/test_scenes.h"
@@ -22,10 +23,10 @@ using test::Rendered;
 using test::renderer_of;
 using test::TestScene;
 
-class CudaSmallScenes : public testing::TestWithParam<TestScene> {};
+class CudaSmallScenes : public test::CoreTest, public testing::WithParamInterface<TestScene> {};
+using CudaRenderer = test::CoreTest;
 
 TEST_P(CudaSmallScenes, MatchesReference) {
-  REQUIRE_DEVICE();
   const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
   const auto reference = render(*renderer_of(ordered, RendererKind::reference), scene.request);
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request);
@@ -37,7 +38,6 @@ TEST_P(CudaSmallScenes, MatchesReference) {
 // the near plane or into the image among it. Order is another matter: sub-frames blend in the order
 // of their key frame, which a turn makes wrong.
 TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
-  REQUIRE_DEVICE();
   const TestScene& scene = GetParam();
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto exact = renderer->make_view({});
@@ -59,7 +59,6 @@ TEST_P(CudaSmallScenes, SubFramesOnTheForecastPathMissNothing) {
 }
 
 TEST_P(CudaSmallScenes, KeyFramesMeasureWhatTheCpuCoresDo) {
-  REQUIRE_DEVICE();
   const TestScene& scene = GetParam();
   for (const test::Move& move : test::moves()) {
     const FrameRequest request = test::request_on_path(scene, move, 0);
@@ -74,7 +73,6 @@ TEST_P(CudaSmallScenes, KeyFramesMeasureWhatTheCpuCoresDo) {
 
 // The camera leaps once.
 TEST_P(CudaSmallScenes, CatgsStaysCloseToExactWhereverTheCameraGoes) {
-  REQUIRE_DEVICE();
   const TestScene& scene = GetParam();
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto exact = renderer->make_view({});
@@ -95,7 +93,6 @@ TEST_P(CudaSmallScenes, CatgsStaysCloseToExactWhereverTheCameraGoes) {
 
 // Slices are folded as the paper has it; the picture is the unsplit one's.
 TEST_P(CudaSmallScenes, SplittingChangesNothing) {
-  REQUIRE_DEVICE();
   const TestScene& scene = GetParam();
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto split = renderer->make_view({}), whole = renderer->make_view({.split_tasks = false});
@@ -108,7 +105,6 @@ TEST_P(CudaSmallScenes, SplittingChangesNothing) {
 }
 
 TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
-  REQUIRE_DEVICE();
   const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
   const ViewSettings vanilla{.pipeline = Pipeline::vanilla};
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request, vanilla);
@@ -122,15 +118,13 @@ TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
 INSTANTIATE_TEST_SUITE_P(, CudaSmallScenes, testing::ValuesIn(test::small_scenes()),
                          [](const auto& test) { return test.param.name; });
 
-TEST(CudaRenderer, AGaussianTakesAtMost80BytesOfTheDevice) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, AGaussianTakesAtMost80BytesOfTheDevice) {
   const TestScene scene = random_scene(50'000);
   EXPECT_LE(renderer_of(scene, RendererKind::cuda)->scene_bytes(), 80u * 50'000u);
 }
 
 // Clusters out of sight, or in sight at one end of the window only, cost no Gaussian that is seen.
-TEST(CudaRenderer, FindsWhatIsVisibleFromAnywhereInTheScene) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, FindsWhatIsVisibleFromAnywhereInTheScene) {
   const TestScene scene = random_scene(100'000);
   const auto cuda = renderer_of(scene, RendererKind::cuda);
   const auto cpu = renderer_of(scene, RendererKind::cpu);
@@ -146,15 +140,13 @@ TEST(CudaRenderer, FindsWhatIsVisibleFromAnywhereInTheScene) {
   }
 }
 
-TEST(CudaRenderer, RepeatsItselfToTheBit) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, RepeatsItselfToTheBit) {
   const TestScene scene = random_scene(50'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   EXPECT_EQ(render(*renderer, scene.request).rgb, render(*renderer, scene.request).rgb);
 }
 
-TEST(CudaRenderer, ViewsRenderSideBySide) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, ViewsRenderSideBySide) {
   const TestScene scene = random_scene(50'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto alone = render(*renderer, scene.request);
@@ -166,8 +158,7 @@ TEST(CudaRenderer, ViewsRenderSideBySide) {
   }
 }
 
-TEST(CudaRenderer, OneViewFollowsSizesThatChange) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, OneViewFollowsSizesThatChange) {
   const TestScene scene = random_scene(20'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto view = renderer->make_view({});
@@ -181,8 +172,7 @@ TEST(CudaRenderer, OneViewFollowsSizesThatChange) {
   }
 }
 
-TEST(CudaRenderer, CountsThePairsOfTheCpuCoreAndThoseOfAPixelsLastRound) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, CountsThePairsOfTheCpuCoreAndThoseOfAPixelsLastRound) {
   const TestScene scene = random_scene(20'000);
   // A slice blends some of what an unsplit tile's earlier entries hide.
   const ViewSettings counting{.count_pairs = true, .split_tasks = false};
@@ -194,8 +184,7 @@ TEST(CudaRenderer, CountsThePairsOfTheCpuCoreAndThoseOfAPixelsLastRound) {
   EXPECT_LE(static_cast<double>(cuda.stats.blended_pairs), pairs * 1.3);
 }
 
-TEST(CudaRenderer, VideoFormatIsTheCpuCores) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, VideoFormatIsTheCpuCores) {
   const TestScene scene = random_scene(20'000);
   const ViewSettings video{.format = PixelFormat::i420};
   const auto cuda = renderer_of(scene, RendererKind::cuda)->make_view(video);
@@ -219,8 +208,7 @@ TEST(CudaRenderer, VideoFormatIsTheCpuCores) {
   }
 }
 
-TEST(CudaRenderer, TileLoadsAddUpToTheLists) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, TileLoadsAddUpToTheLists) {
   const TestScene scene = random_scene(20'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla, Pipeline::catgs}) {
@@ -237,8 +225,7 @@ TEST(CudaRenderer, TileLoadsAddUpToTheLists) {
   }
 }
 
-TEST(CudaRenderer, LongTilesAreSplit) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, LongTilesAreSplit) {
   TestScene scene = random_scene(200'000);
   // The whole scene lies in a few of the tiles.
   scene.request.camera = make_camera(Pose{}, {512, 512}, 40.0f);
@@ -255,8 +242,7 @@ TEST(CudaRenderer, LongTilesAreSplit) {
 
 // A pixel that two black layers finish keeps a hundredth of its light for the background: nothing
 // of the white ones behind shows, in whatever slices they are.
-TEST(CudaRenderer, NothingShowsBehindAFinishedPixel) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, NothingShowsBehindAFinishedPixel) {
   constexpr int layers = 4000;
   GaussianCloud cloud;
   cloud.resize(layers, 0);
@@ -289,8 +275,7 @@ TEST(CudaRenderer, NothingShowsBehindAFinishedPixel) {
 // Against the reference, at its worst: two layers leave a little less than what the next one, as
 // opaque as may be, brings below transmittance_min. The reference finishes the pixel without it;
 // the round takes it in, wherever in the round it stands, and the others behind it.
-TEST(CudaRenderer, TheRestOfARoundAddsNoMoreThanItsBound) {
-  REQUIRE_DEVICE();
+TEST_F(CudaRenderer, TheRestOfARoundAddsNoMoreThanItsBound) {
   constexpr double bound = transmittance_min / (1.0 - alpha_max);
   for (const int before : {0, 1, 7, 8, 27, 28, 29, 30, 31, 32, 62}) {
     GaussianCloud cloud;
@@ -314,6 +299,19 @@ TEST(CudaRenderer, TheRestOfARoundAddsNoMoreThanItsBound) {
       most = std::max(most, std::abs(double{cuda.rgb[i]} - double{reference.rgb[i]}));
     EXPECT_LE(most, bound) << before;
     EXPECT_GE(most, before <= 1 ? 0.5 * bound : 0.0) << before;  // the case is the one meant
+  }
+}
+
+TEST_F(CudaRenderer, CutsOfTreesAreThoseOfTheCpuCore) {
+  const test::TreeScenes scenes;
+  const auto cuda = scenes.in_pages(), cpu = scenes.in_pages(1u << 28, RendererKind::cpu);
+  for (const float distance : {3.0f, 25.0f, 60.0f, 200.0f}) {
+    const FrameRequest request = test::tree_request(distance, 3.0f);
+    const Rendered drawn = render(*cuda, request), expected = render(*cpu, request);
+    EXPECT_NEAR(drawn.stats.nodes, expected.stats.nodes, 2 + expected.stats.nodes / 100);
+    EXPECT_NEAR(drawn.stats.finest_level, expected.stats.finest_level, 1);
+    EXPECT_NEAR(drawn.stats.coarsest_level, expected.stats.coarsest_level, 1);
+    EXPECT_GE(test::psnr_db(drawn.rgb, expected.rgb), 50.0) << "from " << distance;
   }
 }
 

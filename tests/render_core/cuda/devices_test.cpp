@@ -1,5 +1,4 @@
 // Many Views over one scene, on one CUDA device and on several; needs a device, better two.
-#include <algorithm>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -9,9 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "render_core/base/device_set.h"
-#include "render_core/base/error.h"
 #include "tests/render_core/cuda/device.h"
 #include "tests/support/camera_moves.h"
+#include "tests/support/refusal.h"
 
 namespace catgs {
 namespace {
@@ -21,9 +20,7 @@ using test::Rendered;
 using test::TestScene;
 using testing::Each;
 using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::Pair;
-using testing::ThrowsMessage;
 
 /// Some groups of key frame and sub-frames along `move`.
 std::vector<Rendered> draw_path(View& view, const TestScene& scene, const test::Move& move) {
@@ -35,10 +32,8 @@ std::vector<Rendered> draw_path(View& view, const TestScene& scene, const test::
   return frames;
 }
 
-class Devices : public testing::Test {
+class Devices : public test::CoreTest {
  protected:
-  void SetUp() override { REQUIRE_DEVICE(); }
-
   std::unique_ptr<Renderer> make(std::shared_ptr<DeviceSet> set) {
     return make_renderer(scene_.cloud, {.kind = RendererKind::cuda, .pool = {}, .devices = set})
         .renderer;
@@ -107,8 +102,8 @@ TEST_F(Devices, AMissingDeviceIsAMistakeForAutoToo) {
   for (const RendererKind kind : {RendererKind::cuda, RendererKind::automatic}) {
     const RendererOptions options{
         .kind = kind, .pool = {}, .devices = std::make_shared<DeviceSet>(std::vector<int>{4096})};
-    EXPECT_THAT([&] { make_renderer(scene_.cloud, options); },
-                ThrowsMessage<InputError>(HasSubstr("there is no CUDA device 4096")));
+    EXPECT_EQ(test::refusal_of([&] { make_renderer(scene_.cloud, options); }).source,
+              "--device 4096");
   }
 }
 

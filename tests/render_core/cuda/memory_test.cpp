@@ -16,9 +16,9 @@ using test::render;
 using test::render_in;
 using test::renderer_of;
 using test::TestScene;
+using CudaMemory = test::CoreTest;
 
-TEST(CudaMemory, BoundedListsKeepTheNearestAndCountTheRest) {
-  REQUIRE_DEVICE();
+TEST_F(CudaMemory, BoundedListsKeepTheNearestAndCountTheRest) {
   const TestScene scene = random_scene(50'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto whole = render(*renderer, scene.request);
@@ -32,8 +32,7 @@ TEST(CudaMemory, BoundedListsKeepTheNearestAndCountTheRest) {
 }
 
 // Lists that find no memory are cut, counted, and grow no more; frames continue.
-TEST(CudaMemory, ListsThatTheDeviceCannotHoldAreCut) {
-  REQUIRE_DEVICE();
+TEST_F(CudaMemory, ListsThatTheDeviceCannotHoldAreCut) {
   const TestScene scene = random_scene(400'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const auto view = renderer->make_view({});
@@ -53,8 +52,7 @@ TEST(CudaMemory, ListsThatTheDeviceCannotHoldAreCut) {
 
 // Nor do sub-frames follow a key frame that failed. The picture of that one alone is larger than
 // all that the View could give back, so that no retreat makes room for it.
-TEST(CudaMemory, AViewOutlivesAFrameThatFoundNone) {
-  REQUIRE_DEVICE();
+TEST_F(CudaMemory, AViewOutlivesAFrameThatFoundNone) {
   TestScene scene = random_scene(5'000);
   const auto renderer = renderer_of(scene, RendererKind::cuda);
   const test::Move move = test::moves().front();
@@ -77,8 +75,7 @@ TEST(CudaMemory, AViewOutlivesAFrameThatFoundNone) {
   EXPECT_GE(test::psnr_db(drawn.rgb, render(*renderer, next).rgb), 60.0);
 }
 
-TEST(CudaMemory, AnEmptySceneStaysOne) {
-  REQUIRE_DEVICE();
+TEST_F(CudaMemory, AnEmptySceneStaysOne) {
   TestScene scene;
   scene.cloud = std::make_shared<const GaussianCloud>();
   scene.request.camera = make_camera(Pose{}, {64, 48}, 50.0f);

@@ -10,6 +10,7 @@
 
 #include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/analysis/voxel_grid.h"
+#include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/files/sanitize.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/interiors.h"
@@ -106,16 +107,13 @@ TEST(FirstSight, TheCameraNeverStandsInsideOfACluster) {
   GaussianCloud cloud = ball(1.0f);
   std::mt19937 random(3);
   std::uniform_real_distribution<float> uniform(-3.0f, 3.0f);
-  const GaussianCloud fog = sampled_surface(60000, 0.1f, [&] {
+  GaussianCloud fog = sampled_surface(60000, 0.1f, [&] {
     return glm::vec3(uniform(random), uniform(random), std::abs(uniform(random)));
   });
-  for (std::size_t i = 0; i < fog.size(); ++i) {
-    cloud.mean.push_back(fog.mean[i]);
-    cloud.rotation.push_back(fog.rotation[i]);
-    cloud.scale.push_back(fog.scale[i]);
-    cloud.opacity.push_back(0.1f);
-    cloud.sh.push_back(fog.sh[i]);
-  }
+  for (float& opacity : fog.opacity) opacity = 0.1f;
+  const std::size_t first = cloud.size();
+  cloud.resize(first + fog.size(), 0);
+  copy_gaussians(fog, first, cloud);
   const SceneHints hints = estimate(cloud);
   const VoxelGrid grid(cloud, hints.limits);
   EXPECT_LT(grid.depth_around(hints.start_pose.position), 0.2f);

@@ -1,6 +1,7 @@
 #include "render_core/frame/frame_driver.h"
 
 #include <new>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -93,8 +94,11 @@ TEST(FrameDriver, PlansByTheNearestDepthOfTheLastFrame) {
 TEST(FrameDriver, AFailureIsToldAndEndsTheGroup) {
   const std::vector<std::pair<std::function<void()>, RenderStatus::Code>> failures = {
       {[] { throw std::bad_alloc(); }, RenderStatus::Code::out_of_memory},
+      {[] { throw DeviceError(RenderStatus::Code::out_of_memory, "lists"); },
+       RenderStatus::Code::out_of_memory},
       {[] { throw DeviceError(RenderStatus::Code::device_failed, "lost"); },
-       RenderStatus::Code::device_failed}};
+       RenderStatus::Code::device_failed},
+      {[] { throw std::runtime_error("of an unknown kind"); }, RenderStatus::Code::device_failed}};
   for (const auto& [fails, code] : failures) {
     Core core(paper);
     ASSERT_TRUE(core.render(resting()).ok());

@@ -11,7 +11,6 @@
 
 #include "render_core/math/blend-inl.h"
 #include "render_core/math/camera-inl.h"
-#include "render_core/math/colour-inl.h"
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
@@ -231,24 +230,6 @@ TEST_F(Formulas, NothingIsFullyOpaque) {
   auto pixel = math::empty_pixel<double>();
   math::blend(pixel, 0.0, {1.0, 0.0, 0.0});
   EXPECT_DOUBLE_EQ(pixel.colour.x, 0.99);
-}
-
-TEST_F(Formulas, ColourCodesOfBt709LimitedRange) {
-  // Codes of 100 % colour bars as printed in ITU-R BT.709-6 for 8 bits.
-  const auto expect_codes = [](math::Vec3<double> rgb, long y, long cb, long cr) {
-    const auto chroma = math::chroma_codes(rgb);
-    EXPECT_EQ(std::lround(math::luma_code(rgb)), y);
-    EXPECT_EQ(std::lround(chroma.x), cb);
-    EXPECT_EQ(std::lround(chroma.y), cr);
-  };
-  expect_codes({1, 1, 1}, 235, 128, 128);
-  expect_codes({1, 1, 0}, 219, 16, 138);
-  expect_codes({0, 1, 1}, 188, 154, 16);
-  expect_codes({0, 1, 0}, 173, 42, 26);
-  expect_codes({1, 0, 1}, 78, 214, 230);
-  expect_codes({1, 0, 0}, 63, 102, 240);
-  expect_codes({0, 0, 1}, 32, 240, 118);
-  expect_codes({0, 0, 0}, 16, 128, 128);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "render_core/motion/predictor.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <numbers>
@@ -11,6 +10,7 @@
 
 #include "render_core/metrics/summary.h"
 #include "render_core/motion/script.h"
+#include "tests/support/shared_folder.h"
 
 namespace catgs {
 namespace {
@@ -398,12 +398,8 @@ TEST(Predictor, ForeseesScriptedMotion) {
 }
 
 TEST(SharedTraces, RecordedMotionIsForeseen) {
-  const char* shared = std::getenv("CATGS_SHARED_DIR");
-  const std::filesystem::path traces =
-      (shared != nullptr ? std::filesystem::path(shared)
-                         : std::filesystem::path(CATGS_SOURCE_DIR).parent_path() / "shared") /
-      "traces";
-  if (!std::filesystem::is_directory(traces)) GTEST_SKIP() << traces << " is not there";
+  const auto traces = test::shared_folder("traces");
+  if (traces.empty()) GTEST_SKIP() << "no shared folder traces";
   for (const auto& entry : std::filesystem::recursive_directory_iterator(traces)) {
     if (entry.path().extension() != ".tum") continue;
     const Errors errors = median_errors(read_tum(entry.path()));

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <functional>
 #include <span>
 #include <sstream>
 #include <string>
@@ -10,12 +9,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "render_core/base/error.h"
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "tests/render_core/scene/random_cloud.h"
+#include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -39,38 +38,6 @@ inline const LoadContext& two_threads() {
   static ThreadPool pool(2);
   static const LoadContext context(pool);
   return context;
-}
-
-/// Message of the InputError that `call` throws; fails the test when it throws none.
-inline std::string input_error(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& e) {
-    return e.what();
-  }
-  ADD_FAILURE() << "no InputError was thrown";
-  return {};
-}
-
-/// The input that an error refuses, without the words for people.
-struct Refusal {
-  std::string source, where;
-
-  bool operator==(const Refusal&) const = default;
-};
-inline void PrintTo(const Refusal& refusal, std::ostream* out) {
-  *out << "{\"" << refusal.source << "\", \"" << refusal.where << "\"}";
-}
-
-/// What the InputError names that `call` throws; fails the test when it throws none.
-inline Refusal refusal_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& e) {
-    return {e.source(), e.where()};
-  }
-  ADD_FAILURE() << "no InputError was thrown";
-  return {};
 }
 
 /// What a lossy format may change, per field. 0 means bit for bit.

@@ -9,9 +9,9 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/gaussian_cloud.h"
-#include "render_core/walk/find_ground.h"
 #include "render_core/walk/occupancy.h"
 #include "render_core/walk/walk_map.h"
+#include "render_core/walk/walkable_area.h"
 
 namespace catgs::test {
 
@@ -71,7 +71,7 @@ inline walk::WalkMap map_of(const GaussianCloud& cloud, const glm::vec3& start, 
   ThreadPool pool(threads);
   walk::Occupancy occupancy(walk::grid_around(start, {0, 0, 1}, eye_m));
   occupancy.add(cloud, pool);
-  return walk::find_ground(occupancy, {}, start, "test", pool);
+  return walk::find_walkable_area(occupancy, {}, start, "test", pool);
 }
 
 }  // namespace catgs::test

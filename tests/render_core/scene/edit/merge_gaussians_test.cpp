@@ -9,6 +9,7 @@
 #include "render_core/reference/reference.h"
 #include "render_core/scene/prune.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/picked.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 
@@ -86,15 +87,10 @@ TEST(MergeGaussians, FewerGaussiansAreLeftAlone) {
 
 TEST(MergeGaussians, IndistinguishableGaussiansAreMerged) {
   GaussianCloud cloud = random_cloud(200, 0);
-  cloud.resize(400, 0);
-  for (std::size_t i = 0; i < 200; ++i) {
-    cloud.opacity[i] = 0.4f * cloud.opacity[i];
-    cloud.mean[200 + i] = cloud.mean[i];
-    cloud.scale[200 + i] = cloud.scale[i];
-    cloud.rotation[200 + i] = cloud.rotation[i];
-    cloud.opacity[200 + i] = cloud.opacity[i];
-    cloud.sh[200 + i] = cloud.sh[i];
-  }
+  for (float& opacity : cloud.opacity) opacity *= 0.4f;
+  std::vector<std::uint32_t> twice(400);
+  for (std::uint32_t i = 0; i < 400; ++i) twice[i] = i % 200;
+  cloud = picked(cloud, twice);
   const GaussianCloud after = merged(cloud, 200);
   for (std::size_t i = 0; i < 200; ++i) {
     EXPECT_LT(glm::distance(after.mean[i], cloud.mean[i]), 1e-5f);

@@ -14,9 +14,6 @@
 namespace catgs::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-
 constexpr glm::vec3 down_y(0, -1, 0);
 
 void expect_near(const glm::vec3& a, const glm::vec3& b, float tolerance = 1e-5f) {
@@ -44,9 +41,6 @@ TEST(Sidecar, FieldsAreRead) {
   EXPECT_EQ(parse_sidecar(R"({"up": [0, -2, 0]})").up, down_y);
   EXPECT_EQ(parse_sidecar(R"({"up": "-x"})").up, glm::vec3(-1, 0, 0));
   EXPECT_FALSE(parse_sidecar("{}").up);
-}
-
-TEST(Sidecar, ModelsAreRead) {
   EXPECT_EQ(parse_sidecar(R"({"model": "2dgs"})").model, SplatModel::surfels);
   EXPECT_EQ(parse_sidecar(R"({"model": "antialiased"})").model, SplatModel::antialiased);
   EXPECT_EQ(parse_sidecar("{}").model, std::nullopt);
@@ -132,7 +126,7 @@ TEST_F(Hints, AnOrbitNarrowsTheLimits) {
   EXPECT_LE(elevation, 0.5f + 1e-4f);
   expect_near(forward(hints.start_pose), -from_focus / distance, 1e-4f);
   EXPECT_EQ(hints.limits.min.x, std::min(free.limits.min.x, hints.start_pose.position.x));
-  EXPECT_THAT(hints.source, HasSubstr("with the orbit of its file"));
+  EXPECT_EQ(hints.source, "estimated, with the orbit of its file");
 
   orbit_ = OrbitLimits{-1.570796f, 1.570796f, 0.0f};  // anywhere
   EXPECT_EQ(find().start_pose.position, free.start_pose.position);
@@ -204,15 +198,15 @@ TEST_F(Hints, ScaleIsTheSameWhereverVisitsBegin) {
 TEST_F(Hints, AnUnknownFieldOfTheSidecarOnlyLeavesANote) {
   write("s.json", R"({"near": 0.5, "upp": "y"})");
   EXPECT_EQ(find().near_z, 0.5f);
-  EXPECT_THAT(notes_, testing::ElementsAre(
-                          AllOf(HasSubstr("s.json"), HasSubstr("'upp'"), HasSubstr("start_pose"))));
+  EXPECT_EQ(notes_.size(), 1u);
 }
 
 TEST_F(Hints, UnusableCameraFilesOnlyLeaveANote) {
   write("cameras.json", R"([{"position": [0, 0], "rotation": []}])");
   EXPECT_EQ(find().source, "estimated");
   ASSERT_EQ(notes_.size(), 1u);
-  EXPECT_THAT(notes_[0], HasSubstr("cameras.json: [0].position"));
+  EXPECT_EQ(notes_[0], "not used: " + (folder_ / "cameras.json").string() +
+                           ": [0].position: is not an array of 3 numbers");
   write("s.json", R"({"near": -1})");
   EXPECT_EQ(refusal_of([&] { find(); }), (Refusal{(folder_ / "s.json").string(), "near"}));
 }

@@ -1,11 +1,11 @@
 // Real files from the shared folder; skipped where it is absent.
-#include <cstdlib>
 #include <tuple>
 
 #include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/shared_folder.h"
 
 namespace catgs::test {
 namespace {
@@ -13,10 +13,7 @@ namespace {
 class SharedScenes : public ::testing::Test {
  protected:
   void SetUp() override {
-    const char* set = std::getenv("CATGS_SHARED_DIR");
-    scenes_ = std::filesystem::path(set ? set : CATGS_SOURCE_DIR "/../shared") / "scenes";
-    if (!std::filesystem::is_directory(scenes_))
-      GTEST_SKIP() << "no folder " << scenes_ << "; set CATGS_SHARED_DIR";
+    if (scenes_.empty()) GTEST_SKIP() << "no shared folder scenes";
   }
 
   static void expect_sound(const Scene& scene) {
@@ -30,23 +27,20 @@ class SharedScenes : public ::testing::Test {
     EXPECT_LT(grid.depth_around(eye), 0.2f) << "the first pose is inside of something";
   }
 
-  std::filesystem::path scenes_;
+  const std::filesystem::path scenes_ = shared_folder("scenes");
 };
 
-TEST_F(SharedScenes, SogVersion2Zip) {
-  const Scene scene = load_scene(scenes_ / "skull.sog");
-  EXPECT_EQ(scene.format, "sog v2 (zip)");
-  EXPECT_EQ(scene.report.read, 94936u);
-  EXPECT_EQ(scene.cloud.sh_degree, 3);
-  expect_sound(scene);
-}
-
-TEST_F(SharedScenes, CompressedPly) {
-  const Scene scene = load_scene(scenes_ / "guitar.compressed.ply");
-  EXPECT_EQ(scene.format, "compressed ply");
-  EXPECT_EQ(scene.report.read, 90854u);
-  EXPECT_EQ(scene.cloud.sh_degree, 0);
-  expect_sound(scene);
+TEST_F(SharedScenes, SingleFiles) {
+  const std::array<std::tuple<const char*, const char*, std::size_t, int>, 2> files = {
+      {{"skull.sog", "sog v2 (zip)", 94936, 3},
+       {"guitar.compressed.ply", "compressed ply", 90854, 0}}};
+  for (const auto& [file, format, gaussians, sh_degree] : files) {
+    const Scene scene = load_scene(scenes_ / file);
+    EXPECT_EQ(scene.format, format);
+    EXPECT_EQ(scene.report.read, gaussians);
+    EXPECT_EQ(scene.cloud.sh_degree, sh_degree);
+    expect_sound(scene);
+  }
 }
 
 TEST_F(SharedScenes, StreamedSogLevels) {

@@ -1,5 +1,7 @@
 #include "render_core/scene/files/tour_check.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "render_core/scene/files/media_name.h"
@@ -9,36 +11,37 @@ namespace catgs::test {
 namespace {
 
 using namespace std::string_literals;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 class ToursOnDisk : public FolderTest {
  protected:
-  std::string mistake(const std::string& stop) {
-    write("hall.json", fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", stop));
-    return mistake_in_tours({folder_ / "hall.json", {}, {}}).value_or("");
+  /// The mistake in `content` of the sidecar, without the part that all warnings begin with.
+  std::string mistake_in(const std::string& content) {
+    const auto path = write("hall.json", content);
+    const std::string warning = mistake_in_tours({path, {}, {}}).value_or("");
+    const std::string start = std::string(faulty_tours) + path.string() + ": ";
+    EXPECT_TRUE(warning.empty() || warning.starts_with(start)) << warning;
+    return warning.substr(std::min(start.size(), warning.size()));
+  }
+  std::string mistake(const std::string& more_of_stop) {
+    return mistake_in(fmt::format(
+        R"({{"tours": [{{"stops": [{{"position": [0, 0, 0], "look_at": [0, 0, 1]{}}}]}}]}})",
+        more_of_stop));
   }
 };
 
 // tests/server/scenes/tours_test.cpp tests what check_tours() finds, as authors meet it.
 TEST_F(ToursOnDisk, MistakesNameFileAndField) {
   EXPECT_FALSE(mistake_in_tours({folder_ / "hall.json", {}, {}}));
-  EXPECT_EQ(mistake(R"({"position": [0, 0, 0], "look_at": [0, 0, 1]})"), "");
-  EXPECT_THAT(mistake(R"({"position": [0, 0, 0], "look_at": [0, 0, 1], "titel": "Door"})"),
-              AllOf(HasSubstr("hall.json: tours[0].stops[0]: unknown field 'titel'"),
-                    HasSubstr("known are title")));
-  write("hall.json", "{ broken");
-  EXPECT_THAT(mistake_in_tours({folder_ / "hall.json", {}, {}}).value(),
-              HasSubstr("hall.json: byte"));
+  EXPECT_EQ(mistake(""), "");
+  EXPECT_THAT(mistake(R"(, "titel": "Door")"), StartsWith("tours[0].stops[0]: "));
+  EXPECT_THAT(mistake_in("{ broken"), StartsWith("byte "));
 }
 
 TEST_F(ToursOnDisk, MediaOfAnySiteNeedHttps) {
-  const auto shows = [&](const char* src) {
-    return mistake(fmt::format(
-        R"({{"position": [0, 0, 0], "look_at": [0, 0, 1], "media": [{{"src": "{}"}}]}})", src));
-  };
-  EXPECT_EQ(shows("https://media.example/a.mp4"), "");
-  EXPECT_THAT(shows("http://media.example/a.mp4"), HasSubstr("media[0].src"));
+  EXPECT_EQ(mistake(R"(, "media": [{"src": "https://media.example/a.mp4"}])"), "");
+  EXPECT_THAT(mistake(R"(, "media": [{"src": "http://media.example/a.mp4"}])"),
+              StartsWith("tours[0].stops[0].media[0].src: "));
 }
 
 TEST(MediaName, NamesArePlainPathComponents) {

@@ -17,6 +17,8 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include "tests/support/temporary_folder.h"
+
 namespace catgs::test {
 
 namespace {
@@ -137,6 +139,14 @@ std::string gzip(const std::string& bytes) {
   out.resize(stream.total_out);
   deflateEnd(&stream);
   return out;
+}
+
+std::map<std::string, std::string> files_below(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.is_regular_file())
+      files[entry.path().lexically_relative(folder).string()] = content_of(entry.path());
+  return files;
 }
 
 std::string zip(const std::map<std::string, std::string>& files, bool deflated) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -32,6 +33,9 @@ std::string encode_compressed_ply(const GaussianCloud& cloud, bool colour_limits
 
 /// File name to content of a SOG folder. Each Gaussian has its own palette entry, so at most 65536.
 std::map<std::string, std::string> encode_sog(const GaussianCloud& cloud, int version);
+
+/// Name to content of the files below a folder, as zip() takes them.
+std::map<std::string, std::string> files_below(const std::filesystem::path& folder);
 
 /// Lossless (or lossy) WebP of RGBA texels.
 std::string encode_webp(const std::string& rgba, int width, int height, bool lossless = true);

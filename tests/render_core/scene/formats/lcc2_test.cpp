@@ -17,8 +17,7 @@
 namespace catgs::test {
 namespace {
 
-using ::testing::Contains;
-using ::testing::HasSubstr;
+using ::testing::ElementsAre;
 
 using Json = nlohmann::json;
 
@@ -102,7 +101,7 @@ TEST_F(Lcc2Test, LeavesAreTheFinestLevel) {
     EXPECT_EQ(open({}, 599).count, 300u);
     EXPECT_EQ(open({}, 250).count, 90u + 60);  // only the first region's next level fits
     EXPECT_EQ(refusal_of([&] { open({}, 89); }), at("Gaussian budget"));
-    EXPECT_THAT(open().notes, Contains(HasSubstr("originated from XGRIDS")));
+    EXPECT_THAT(open().notes, ElementsAre("LCC2: Data Organization Format originated from XGRIDS"));
   }
 }
 

@@ -18,6 +18,10 @@ SogFile parse(const std::string& archive) {
                   two_threads());
 }
 
+Refusal refusal(const Files& files, bool deflated = false) {
+  return refusal_of([&] { parse(zip(files, deflated)); });
+}
+
 Files with_meta(Files files, const std::function<void(nlohmann::json&)>& change) {
   auto meta = nlohmann::json::parse(files.at("meta.json"));
   change(meta);
@@ -37,26 +41,17 @@ Tolerance steps(int version) {
           .sh_rest = 0.0048f};
 }
 
-struct Case {
-  int version, sh_degree;
-};
-
-class SogVersions : public ::testing::TestWithParam<Case> {};
-
-TEST_P(SogVersions, VersionsAreReadFromArchivesAndFolders) {
-  const auto [version, degree] = GetParam();
-  const GaussianCloud cloud = random_cloud(5001, degree);
-  const Files files = encode_sog(cloud, version);
-  for (const bool deflated : {false, true}) {
-    const SogFile sog = parse(zip(files, deflated));
-    EXPECT_EQ(sog.version, version);
-    expect_near(cloud, sog.cloud, steps(version));
-  }
+TEST(Sog, VersionsAreReadFromArchives) {
+  for (const int version : {1, 2})
+    for (const int degree : {0, 1, 2, 3})
+      for (const bool deflated : {false, true}) {
+        SCOPED_TRACE(testing::Message() << "version " << version << ", degree " << degree);
+        const GaussianCloud cloud = random_cloud(5001, degree);
+        const SogFile sog = parse(zip(encode_sog(cloud, version), deflated));
+        EXPECT_EQ(sog.version, version);
+        expect_near(cloud, sog.cloud, steps(version));
+      }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sog, SogVersions,
-                         ::testing::Values(Case{1, 0}, Case{1, 1}, Case{1, 2}, Case{1, 3},
-                                           Case{2, 0}, Case{2, 1}, Case{2, 2}, Case{2, 3}));
 
 TEST(Sog, MetaDataTellsTheModel) {
   const Files files = encode_sog(random_cloud(100, 0), 2);
@@ -147,17 +142,13 @@ TEST(Sog, LyingSizesAreRefusedBeforeMemoryIsTaken) {
   Files files = encode_sog(random_cloud(300, 0), 2);
   for (const std::uint64_t count :
        {std::uint64_t{0}, std::uint64_t{1000}, std::uint64_t{200'000'000}, ~std::uint64_t{0}})
-    refusal_of([&] {
-      parse(zip(with_meta(files, [&](nlohmann::json& meta) { meta["count"] = count; })));
-    });
+    refusal(with_meta(files, [&](nlohmann::json& meta) { meta["count"] = count; }));
   // A picture of one colour is a few bytes however large it is.
   const std::string bomb = encode_webp(std::string(4 * 4096 * 2048, '\0'), 4096, 2048);
   for (auto& [name, content] : files)
     if (name != "meta.json") content = bomb;
-  EXPECT_EQ(refusal_of([&] { parse(zip(files)); }), (Refusal{"scene.sog/means_l.webp", "size"}));
-  EXPECT_EQ(refusal_of([&] {
-              parse(zip(with_meta(files, [](nlohmann::json& m) { m["count"] = 8'000'000; })));
-            }),
+  EXPECT_EQ(refusal(files), (Refusal{"scene.sog/means_l.webp", "size"}));
+  EXPECT_EQ(refusal(with_meta(files, [](nlohmann::json& m) { m["count"] = 8'000'000; })),
             (Refusal{"scene.sog/meta.json", "count"}));
 }
 
@@ -178,8 +169,7 @@ TEST_F(SogFolder, NeitherZerosNorManyNamesOfOneFileMakeAHugeScene) {
   for (auto& [name, content] : files)
     if (name != "meta.json") content = padded(one_colour, 32'000);
   EXPECT_EQ(parse(zip(files)).cloud.size(), count) << "so many bytes could hold them";
-  EXPECT_EQ(refusal_of([&] { parse(zip(files, true)); }),
-            (Refusal{"scene.sog/meta.json", "count"}));
+  EXPECT_EQ(refusal(files, true), (Refusal{"scene.sog/meta.json", "count"}));
 
   files = with_meta(files, [](nlohmann::json& meta) {
     meta["means"]["files"] = {"image.webp", "./image.webp"};
@@ -194,7 +184,7 @@ TEST_F(SogFolder, NeitherZerosNorManyNamesOfOneFileMakeAHugeScene) {
 
 TEST(Sog, ArchivesThatGrowAreRefused) {
   const Files bomb = {{"meta.json", std::string(4 << 20, ' ')}};
-  EXPECT_EQ(refusal_of([&] { parse(zip(bomb, true)); }), (Refusal{"scene.sog", "entry meta.json"}));
+  EXPECT_EQ(refusal(bomb, true), (Refusal{"scene.sog", "entry meta.json"}));
   for (std::size_t bytes = (1 << 20) + 4096; bytes < (1 << 20) + 8192; bytes += 256) {
     const std::string archive = zip({{"spaces", std::string(bytes, ' ')}}, true);
     const MemorySource file("scene.sog", bytes_of(archive));
@@ -205,9 +195,9 @@ TEST(Sog, ArchivesThatGrowAreRefused) {
   }
   Files many;
   for (int i = 0; i < 65536; ++i) many[std::to_string(i)] = "";
-  EXPECT_EQ(refusal_of([&] { parse(zip(many)); }), (Refusal{"scene.sog", "entry meta.json"}));
+  EXPECT_EQ(refusal(many), (Refusal{"scene.sog", "entry meta.json"}));
   many["65536"] = "";
-  EXPECT_EQ(refusal_of([&] { parse(zip(many)); }), (Refusal{"scene.sog", ""}));
+  EXPECT_EQ(refusal(many), (Refusal{"scene.sog", ""}));
 }
 
 TEST(Sog, ImagesHaveATexelPerGaussianAndNotManyMore) {
@@ -259,9 +249,9 @@ TEST(Sog, DamagedFilesAreRefused) {
   for (const auto& [name, content] : files) {
     Files cut = files;
     cut[name] = content.substr(0, content.size() / 2);
-    EXPECT_EQ(refusal_of([&] { parse(zip(cut)); }).source, "scene.sog/" + name);
+    EXPECT_EQ(refusal(cut).source, "scene.sog/" + name);
     cut[name] = "garbage";
-    EXPECT_EQ(refusal_of([&] { parse(zip(cut)); }).source, "scene.sog/" + name);
+    EXPECT_EQ(refusal(cut).source, "scene.sog/" + name);
   }
   Files lossy = files;
   lossy["quats.webp"] = encode_webp(std::string(4 * 20 * 16, 'q'), 20, 16, false);

@@ -66,13 +66,8 @@ class StreamedSogTest : public FolderTest {
 };
 
 TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
-  std::map<std::string, std::string> files = {{"lod-meta.json", meta_.dump()}};
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
-    if (!entry.is_regular_file()) continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    files[entry.path().lexically_relative(folder_.path()).string()] =
-        std::string(std::istreambuf_iterator<char>(in), {});
-  }
+  write("lod-meta.json", meta_.dump());
+  std::map<std::string, std::string> files = files_below(folder_.path());
   const auto path = write("museum.ssog", zip(files));
   LoadOptions options;
   EXPECT_EQ(load_scene(path, options).cloud.mean, load().cloud.mean);

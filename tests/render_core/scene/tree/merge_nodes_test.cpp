@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "render_core/reference/reference.h"
+#include "tests/support/picked.h"
 #include "tests/support/rendered.h"
 #include "tests/support/surface_clouds.h"
 #include "tests/support/test_scenes.h"
@@ -81,7 +82,7 @@ double psnr_from_error(const Node& node, std::span<const Node> others, int degre
 /// A wall with a pattern, in the order of the curve: what captures consist of.
 GaussianCloud wall(std::size_t count) {
   ThreadPool pool(1);
-  GaussianCloud random = test::random_cloud(count, 1, 11), sorted = random;
+  GaussianCloud random = test::random_cloud(count, 1, 11);
   for (std::size_t i = 0; i < count; ++i) {
     glm::vec3& mean = random.mean[i];
     mean.z = 5.0f + 0.002f * mean.z;
@@ -90,16 +91,7 @@ GaussianCloud wall(std::size_t count) {
     random.opacity[i] = 0.3f + 0.6f * random.opacity[i];
     random.sh[i * 4] = glm::vec3(std::sin(3.0f * mean.x), std::cos(2.0f * mean.y), 0.3f);
   }
-  const auto order = morton_order(random.mean, pool);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t from = order[i];
-    sorted.mean[i] = random.mean[from];
-    sorted.scale[i] = random.scale[from];
-    sorted.rotation[i] = random.rotation[from];
-    sorted.opacity[i] = random.opacity[from];
-    std::copy_n(random.sh_of(from), 4, &sorted.sh[i * 4]);
-  }
-  return sorted;
+  return test::picked(random, morton_order(random.mean, pool));
 }
 
 TEST(MergeNodes, NodesLookLikeTheirChildrenFromTheirErrorsDistance) {
@@ -120,15 +112,11 @@ TEST(MergeNodes, NodesLookLikeTheirChildrenFromTheirErrorsDistance) {
 }
 
 TEST(MergeNodes, CoincidentGaussiansBecomeOneThatHidesAsMuch) {
-  GaussianCloud cloud = test::random_cloud(512, 0, 2);
-  for (std::size_t i = 0; i < 256; ++i) {
-    cloud.opacity[i] = 0.3f;
-    cloud.mean[256 + i] = cloud.mean[i];
-    cloud.scale[256 + i] = cloud.scale[i];
-    cloud.rotation[256 + i] = cloud.rotation[i];
-    cloud.opacity[256 + i] = 0.3f;
-    cloud.sh[256 + i] = cloud.sh[i];
-  }
+  GaussianCloud cloud = test::random_cloud(256, 0, 2);
+  std::vector<std::uint32_t> twice(512);
+  for (std::uint32_t i = 0; i < 512; ++i) twice[i] = i % 256;
+  cloud = test::picked(cloud, twice);
+  for (float& opacity : cloud.opacity) opacity = 0.3f;
   const Node node = merged(leaf(cloud, 0, 256), leaf(cloud, 256, 256), 0);
   ASSERT_EQ(node.facts.count, 256u);
   EXPECT_LT(node.facts.error, 1e-6f);

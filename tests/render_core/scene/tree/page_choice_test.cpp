@@ -51,6 +51,9 @@ class Memory {
       if (!holds(path[i], tree)) return;
     }
   }
+  void want_all(float error_px, Cut& cut, std::uint32_t tree = 0) const {
+    for (std::uint64_t page = 1; page < shape_.pages(); ++page) want(page, error_px, cut, tree);
+  }
   [[nodiscard]] std::uint64_t above(std::uint64_t page) const {
     const NodeId root = shape_.root_of(page);
     return shape_.page_of({static_cast<std::uint8_t>(root.level + 1), root.index / 2});
@@ -108,8 +111,7 @@ TEST(PageChoice, NothingIsDroppedWhileThereIsRoom) {
   Memory memory(PageChoice::slots_for(TreeShape(1'000'000, 0)));
   for (int turn = 0; turn < 100; ++turn) {
     Cut cut;
-    for (std::uint64_t page = 1; page < memory.shape().pages(); ++page)
-      memory.want(page, 1.0f, cut);
+    memory.want_all(1.0f, cut);
     EXPECT_TRUE(memory.turn(cut).drop.empty());
   }
   EXPECT_EQ(memory.resident().size(), memory.shape().pages());
@@ -158,8 +160,7 @@ TEST(PageChoice, NoMoreIsDroppedThanIsNeeded) {
   Cut all;
   for (int turn = 0; turn < 50; ++turn) {
     all = {};
-    for (std::uint64_t page = 1; page < memory.shape().pages(); ++page)
-      memory.want(page, 1.0f, all);
+    memory.want_all(1.0f, all);
     memory.turn(all);
   }
   Cut elsewhere;
@@ -211,8 +212,6 @@ TEST(PageChoice, RulesHoldForAnyRequests) {
   }
 }
 
-// Wishes at rest, for far more than there is room for: memory fills, comes to rest, and nothing is
-// read twice on the way.
 // Errors grow towards the root, but a forged file may say something else.
 TEST(PageChoice, RulesHoldForForgedErrors) {
   Memory memory(PageChoice::least_slots);  // one family fits
@@ -229,6 +228,8 @@ TEST(PageChoice, RulesHoldForForgedErrors) {
   EXPECT_FALSE(memory.holds(below)) << "the page above made room for it";
 }
 
+// Requests at rest, for far more than there is room for: memory fills, comes to rest, and nothing
+// is read twice on the way.
 TEST(PageChoice, NothingIsLoadedTwiceAtRest) {
   std::mt19937_64 random(8);
   for (const std::uint32_t slots : {6u, 11u, 50u, 120u}) {
@@ -257,10 +258,8 @@ TEST(PageChoice, TreesGetWhatTheirErrorsAreWorth) {
   const auto settle = [&](float first_px, float second_px) {
     for (int turn = 0; turn < 100; ++turn) {
       std::map<std::uint32_t, Cut> cuts;
-      for (std::uint64_t page = 1; page < memory.shape().pages(); ++page) {
-        if (first_px > 0.0f) memory.want(page, first_px, cuts[0], 0);
-        if (second_px > 0.0f) memory.want(page, second_px, cuts[1], 1);
-      }
+      if (first_px > 0.0f) memory.want_all(first_px, cuts[0], 0);
+      if (second_px > 0.0f) memory.want_all(second_px, cuts[1], 1);
       memory.turn(cuts);
     }
   };
@@ -280,8 +279,7 @@ TEST(PageChoice, ANewTreeGetsARootAndALeavingOneGivesAllBack) {
   Memory memory(13);
   const auto want_all = [&](std::uint32_t tree) {
     Cut cut;
-    for (std::uint64_t page = 1; page < memory.shape().pages(); ++page)
-      memory.want(page, 1.0f, cut, tree);
+    memory.want_all(1.0f, cut, tree);
     return cut;
   };
   for (int turn = 0; turn < 50; ++turn) memory.turn(want_all(0));

@@ -190,8 +190,8 @@ TEST_F(PagedTreeTest, DetailBlendsInAndComesToRest) {
   looked.watch->look({{camera_at(0, -6)}, 0.5f});
   EXPECT_TRUE(looked.watch->waits(looked.tree.now_s()));
   EXPECT_TRUE(looked.comes_to_rest());
-  EXPECT_EQ(looked.watch->missing(), 0u);
-  EXPECT_EQ(looked.watch->coarsest_px(), 0.0f);
+  EXPECT_EQ(looked.watch->progress().missing, 0u);
+  EXPECT_EQ(looked.watch->progress().coarsest_px, 0.0f);
   const int published = looked.store.published();
   std::this_thread::sleep_for(std::chrono::milliseconds(30));
   EXPECT_EQ(looked.store.published(), published);
@@ -206,7 +206,7 @@ TEST_F(PagedTreeTest, ViewsThatCompeteComeToRestAndNothingIsLoadedTwice) {
     b.watch->look({{camera_at(1, -7)}, 0.0f});
     EXPECT_TRUE(a.comes_to_rest());
     EXPECT_TRUE(b.comes_to_rest());
-    EXPECT_GT(a.watch->missing() + b.watch->missing(), 0u);
+    EXPECT_GT(a.watch->progress().missing + b.watch->progress().missing, 0u);
     EXPECT_EQ(a.store.most_loads_of_a_page(), 1);
     EXPECT_EQ(b.store.most_loads_of_a_page(), 1);
     const int published = a.store.published() + b.store.published();
@@ -239,13 +239,13 @@ TEST_F(PagedTreeTest, ViewsAtRestLearnOfRoom) {
   a.watch->look({{camera_at(0, -6)}, 0.0f});
   ASSERT_TRUE(a.comes_to_rest());
   ASSERT_TRUE(b.comes_to_rest());
-  ASSERT_GT(a.watch->missing(), 0u);
+  ASSERT_GT(a.watch->progress().missing, 0u);
   ASSERT_GT(b.tree.table()->size(), 1u);
-  const std::uint64_t changes = a.watch->changes();
+  const std::uint64_t changes = a.watch->progress().changes;
   b.watch.reset();
-  for (int i = 0; i < 1000 && a.watch->changes() == changes; ++i)
+  for (int i = 0; i < 1000 && a.watch->progress().changes == changes; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  EXPECT_GT(a.watch->changes(), changes);
+  EXPECT_GT(a.watch->progress().changes, changes);
   EXPECT_TRUE(a.comes_to_rest());
 }
 

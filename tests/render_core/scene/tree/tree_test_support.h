@@ -4,15 +4,15 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string>
 
 #include "render_core/scene/tree/build_tree.h"
 #include "render_core/scene/tree/tree_file.h"
+#include "tests/support/picked.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -21,24 +21,17 @@ namespace catgs::test {
 inline std::string tree_bytes(const GaussianCloud& cloud, ThreadPool& pool,
                               std::size_t memory_bytes = std::size_t{1} << 30,
                               std::size_t part = 1'000'000) {
-  const auto count = static_cast<std::size_t>(cloud.sh_count());
   const auto each = [&](const std::function<void(const GaussianCloud&)>& take) {
     for (std::size_t first = 0; first < cloud.size(); first += part) {
-      GaussianCloud some;
-      some.resize(std::min(part, cloud.size() - first), cloud.sh_degree);
-      std::copy_n(&cloud.mean[first], some.size(), some.mean.begin());
-      std::copy_n(&cloud.rotation[first], some.size(), some.rotation.begin());
-      std::copy_n(&cloud.scale[first], some.size(), some.scale.begin());
-      std::copy_n(&cloud.opacity[first], some.size(), some.opacity.begin());
-      std::copy_n(&cloud.sh[first * count], some.sh.size(), some.sh.begin());
-      take(some);
+      std::vector<std::uint32_t> some(std::min(part, cloud.size() - first));
+      std::iota(some.begin(), some.end(), static_cast<std::uint32_t>(first));
+      take(picked(cloud, some));
     }
     return std::uint64_t{3};  // dropped
   };
   const TemporaryFolder folder;
   build_tree({each, "test"}, folder / "a.tree", memory_bytes, pool, LoadContext(pool));
-  std::ifstream file(folder / "a.tree", std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return content_of(folder / "a.tree");
 }
 
 /// A file in memory that owns its bytes.

@@ -1,6 +1,4 @@
-#pragma once
-
-// Trees whose checksums are right and whose content is not, drawn by a core.
+// Trees whose checksums are right and whose content is not, drawn.
 
 #include <algorithm>
 #include <cmath>
@@ -15,11 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include <gtest/gtest.h>
-
-#include "tests/support/tree_views.h"
+#include "tests/render_core/cores/tree_views.h"
+#include "tests/support/rendered.h"
 
 namespace catgs::test {
+namespace {
+
+using ForgedTreeViews = CoreTest;
 
 /// 20 leaves: the root's page has two levels, and three pages have leaves, the last one few.
 struct ForgedTrees {
@@ -43,9 +43,9 @@ struct ForgedTrees {
 };
 
 /// True if the tree is drawn, false if it is refused. Pages that are refused alone are not drawn.
-inline bool drawn_or_refused(RendererKind kind, std::string bytes) {
+bool drawn_or_refused(std::string bytes) {
   RendererOptions options;
-  options.kind = kind;
+  options.kind = core;
   options.scene_memory = std::uint64_t{1} << 26;
   try {
     const auto tree = std::make_shared<TreeFile>(source_of(std::move(bytes)));
@@ -66,17 +66,17 @@ inline bool drawn_or_refused(RendererKind kind, std::string bytes) {
   }
 }
 
-/// What the shape does not use is refused, whatever it says.
-inline void expect_unused_slots_to_be_refused(RendererKind kind) {
+// What the shape does not use is refused, whatever it says.
+TEST_F(ForgedTreeViews, UnusedSlotsThatClaimToBeUsedAreRefused) {
   for (const int degree : {1, 3}) {
     const ForgedTrees trees(degree);
-    EXPECT_TRUE(drawn_or_refused(kind, trees.bytes));
+    EXPECT_TRUE(drawn_or_refused(trees.bytes));
     const auto refused = [&](std::uint64_t page, std::size_t slot,
                              const std::function<void(NodeFacts&)>& forge) {
       const auto only = [&](TreePage& forged, std::uint64_t number) {
         if (number == page) forge(forged.facts(slot));
       };
-      EXPECT_FALSE(drawn_or_refused(kind, trees.with(only))) << "page " << page << " slot " << slot;
+      EXPECT_FALSE(drawn_or_refused(trees.with(only))) << "page " << page << " slot " << slot;
     };
     for (const std::uint64_t page : {std::uint64_t{0}, trees.shape.pages() - 1})
       for (const std::size_t slot : {trees.shape.slots() - 1, trees.shape.slots() - 2}) {
@@ -88,8 +88,8 @@ inline void expect_unused_slots_to_be_refused(RendererKind kind) {
   }
 }
 
-/// The ends of each range that a page may use.
-inline void expect_extreme_pages_to_be_drawn(RendererKind kind) {
+// The ends of each range that a page may use.
+TEST_F(ForgedTreeViews, ExtremePagesAreDrawn) {
   const auto each_node = [](const TreeShape& shape, const auto& change) {
     return [&shape, change](TreePage& page, std::uint64_t number) {
       for_each_node_in(shape, number, [&](NodeId node) {
@@ -106,7 +106,7 @@ inline void expect_extreme_pages_to_be_drawn(RendererKind kind) {
   for (const int degree : {1, 3}) {
     const ForgedTrees trees(degree);
     const auto drawn = [&](const char* what, const auto& change) {
-      EXPECT_TRUE(drawn_or_refused(kind, trees.with(each_node(trees.shape, change)))) << what;
+      EXPECT_TRUE(drawn_or_refused(trees.with(each_node(trees.shape, change)))) << what;
     };
     drawn("errors", [](NodeId node, NodeFacts& f, auto) {
       if (node.level > 0) f.error = max_coordinate;
@@ -128,8 +128,9 @@ inline void expect_extreme_pages_to_be_drawn(RendererKind kind) {
   }
 }
 
-/// Bytes changed at random, of those that are used more often.
-inline void expect_random_pages_to_be_drawn_or_refused(RendererKind kind, int rounds) {
+// Bytes changed at random, of those that are used more often.
+TEST_F(ForgedTreeViews, RandomPagesAreDrawnOrRefused) {
+  constexpr int rounds = 60;
   std::mt19937 random(7);
   const auto below = [&](std::size_t end) { return random() % end; };
   int drawn = 0;
@@ -155,10 +156,11 @@ inline void expect_random_pages_to_be_drawn_or_refused(RendererKind kind, int ro
       if (below(8) == 0)
         page.bytes()[below(page.bytes().size())] = static_cast<std::byte>(random());
     };
-    drawn += drawn_or_refused(kind, trees.with(forge)) ? 1 : 0;
+    drawn += drawn_or_refused(trees.with(forge)) ? 1 : 0;
   }
   EXPECT_GT(drawn, rounds / 3);
   EXPECT_LT(drawn, rounds);
 }
 
+}  // namespace
 }  // namespace catgs::test

@@ -1,4 +1,4 @@
-#include "render_core/walk/find_ground.h"
+#include "render_core/walk/walkable_area.h"
 
 #include <atomic>
 
@@ -19,7 +19,7 @@ Stand stand_at(const WalkMap& map, const glm::vec3& place) {
   return stand.value_or(Stand{});
 }
 
-TEST(FindGround, ADoorIsPassedAndANarrowGapIsNot) {
+TEST(WalkableArea, ADoorIsPassedAndANarrowGapIsNot) {
   const glm::vec3 start(2, 2, 1.6f), beyond(6, 3, 1.6f);
   const WalkMap wide = test::map_of(test::room(0.9f), start);
   EXPECT_FALSE(find_path(wide, stand_at(wide, start), stand_at(wide, beyond)).empty());
@@ -28,7 +28,7 @@ TEST(FindGround, ADoorIsPassedAndANarrowGapIsNot) {
   EXPECT_FALSE(stand_below(narrow, beyond));
 }
 
-TEST(FindGround, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
+TEST(WalkableArea, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
   const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
   EXPECT_FALSE(stand_below(map, {0.15f, 2, 1}));
   EXPECT_TRUE(stand_below(map, {0.45f, 2, 1}));
@@ -44,13 +44,13 @@ TEST(FindGround, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
   EXPECT_TRUE(has({2, 1, 0}, Kind::clear));
 }
 
-TEST(FindGround, TheRoofIsNotGroundThatIsReached) {
+TEST(WalkableArea, TheRoofIsNotReached) {
   const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
   ASSERT_EQ(map.storeys.size(), 1u);
   for (const Place& place : map.places) EXPECT_NEAR(place.cells(), map.start.height, 1.0f);
 }
 
-TEST(FindGround, StairsAreClimbedToAnotherStorey) {
+TEST(WalkableArea, StairsAreClimbedToAnotherStorey) {
   const WalkMap map = test::map_of(test::stairs(), {0, 3, 1.6f});
   const Stand below = stand_at(map, {0, 3, 1.6f}), above = stand_at(map, {9, 3, 4.3f});
   EXPECT_NEAR((above.height - below.height) * map.grid.cell, 2.72f, 0.05f);
@@ -70,7 +70,7 @@ TEST(FindGround, StairsAreClimbedToAnotherStorey) {
   EXPECT_EQ(map.storey_at(above.height), 1u);
 }
 
-TEST(FindGround, NobodyFallsFromAnEdge) {
+TEST(WalkableArea, NobodyFallsFromAnEdge) {
   const WalkMap map = test::map_of(test::stairs(), {9, 3, 4.3f});
   Stand at = stand_at(map, {9, 3, 4.3f});
   for (int k = 0; k < 200; ++k) at = move(map, at, {-0.5f, 0.0f});  // towards the edge at 6.48
@@ -79,7 +79,7 @@ TEST(FindGround, NobodyFallsFromAnEdge) {
   EXPECT_NEAR(eyes.z, 2.72f + test::eye_m, 0.1f);
 }
 
-TEST(FindGround, ARandomWalkPassesTheDoorAndNoWall) {
+TEST(WalkableArea, ARandomWalkPassesTheDoorAndNoWall) {
   const glm::vec3 start(2, 2, 1.6f);
   const WalkMap map = test::map_of(test::room(0.9f), start);
   SplitMix64 random(1);
@@ -108,7 +108,7 @@ TEST(FindGround, ARandomWalkPassesTheDoorAndNoWall) {
   EXPECT_GT(crossings, 1);
 }
 
-TEST(FindGround, SteepSlopesAreNoGround) {
+TEST(WalkableArea, SteepSlopesAreNotWalkable) {
   for (const float degrees : {30.0f, 60.0f}) {
     GaussianCloud cloud;
     test::add_plate(cloud, {0, 0, 0}, {4, 0, 0}, {0, 6, 0});
@@ -119,12 +119,12 @@ TEST(FindGround, SteepSlopesAreNoGround) {
   }
 }
 
-TEST(FindGround, DependsNotOnTheThreads) {
+TEST(WalkableArea, IsTheSameForAnyNumberOfThreads) {
   const GaussianCloud cloud = test::room(0.9f);
   EXPECT_EQ(pack(test::map_of(cloud, {2, 2, 1.6f}, 1)), pack(test::map_of(cloud, {2, 2, 1.6f}, 3)));
 }
 
-TEST(FindGround, EndsWhereItsProgressThrows) {
+TEST(WalkableArea, EndsWhereItsProgressThrows) {
   struct Stop {};
   ThreadPool pool(2);
   const GaussianCloud cloud = test::room(0.9f);
@@ -133,18 +133,18 @@ TEST(FindGround, EndsWhereItsProgressThrows) {
   EXPECT_THROW(occupancy.add(cloud, pool, [] { throw Stop(); }), Stop);
   occupancy.add(cloud, pool);
   std::atomic<int> calls = 0;
-  find_ground(occupancy, {}, start, "test", pool, [&] { ++calls; });
+  find_walkable_area(occupancy, {}, start, "test", pool, [&] { ++calls; });
   EXPECT_GT(calls, 70) << "rows of columns, and the loops behind them";
   for (int last = 1; last <= calls; ++last) {
     std::atomic<int> left = last;
     const auto progress = [&] {
       if (--left == 0) throw Stop();
     };
-    EXPECT_THROW(find_ground(occupancy, {}, start, "test", pool, progress), Stop) << last;
+    EXPECT_THROW(find_walkable_area(occupancy, {}, start, "test", pool, progress), Stop) << last;
   }
 }
 
-TEST(FindGround, NoGroundIsAnError) {
+TEST(WalkableArea, ASceneWithoutWalkableAreaIsRefused) {
   EXPECT_THROW(test::map_of(test::room(0.9f), {2, 2, -5}), InputError);
   EXPECT_THROW(test::map_of({}, {0, 0, 0}), InputError);
 }

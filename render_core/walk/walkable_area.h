@@ -11,17 +11,18 @@
 
 namespace catgs::walk {
 
-/// The ground that a person reaches on foot, and the obstacles around it.
+/// The walkable area of a scene: the ground that a person reaches on foot, and the obstacles around
+/// it.
 ///
 /// The top of a run of solid cells is ground where a body has room above it and the slope is not
-/// too steep. Ground of neighbouring columns hangs together where it is no more than a step apart
-/// and a body fits through. It is clear where it hangs together all around within the body's
-/// radius. Of the clear ground, all that hangs together with a place below `start` (world) is kept:
+/// too steep. Ground of neighbouring columns is connected where it is no more than a step apart
+/// and a body fits through. It is clear where it is connected all around within the body's
+/// radius. Of the clear ground, all that is connected to a place below `start` (world) is kept:
 /// with the nearest such place that reaches at least a twentieth as far as the largest.
 ///
-/// Throws InputError for `name` where there is no ground. `progress` is called often, by several
+/// Throws InputError for `name` if there is none. `progress` is called often, by several
 /// threads at a time, and may throw to end the search.
-WalkMap find_ground(
+WalkMap find_walkable_area(
     const Occupancy& occupancy, const Person& person, const glm::vec3& start, std::string_view name,
     ThreadPool& pool, const std::function<void()>& progress = [] {});
 

@@ -1,4 +1,4 @@
-#include "render_core/walk/find_ground.h"
+#include "render_core/walk/walkable_area.h"
 
 #include <algorithm>
 #include <cmath>
@@ -39,7 +39,7 @@ struct Component {
   std::size_t size = 0;
 };
 
-/// The surfaces of `among` that hang together with `seed`; takes them out of `among`.
+/// The surfaces of `among` that are connected to `seed`; takes them out of `among`.
 std::vector<std::uint32_t> flood(const Surfaces& surfaces, std::uint32_t seed,
                                  std::vector<char>& among, Turns& turns) {
   std::vector<std::uint32_t> reached = {seed};
@@ -104,8 +104,8 @@ class Collector {
         size_(surfaces.extent().max - surfaces.extent().min),
         kept_(surfaces.count()) {}
 
-  /// Takes the ground that `seed` hangs together with among the clear one, and what is near to it.
-  void take_ground(std::uint32_t seed, std::vector<char> clear) {
+  /// Takes the clear ground that is connected to `seed`, and what is near to it.
+  void take_area(std::uint32_t seed, std::vector<char> clear) {
     std::vector<std::uint32_t> edge = flood(surfaces_, seed, clear, turns_);
     for (const std::uint32_t i : edge) take(i, Kind::clear);
     for (int step = 0; step < near_steps; ++step) {
@@ -225,9 +225,9 @@ class Collector {
 
 }  // namespace
 
-WalkMap find_ground(const Occupancy& occupancy, const Person& person, const glm::vec3& start,
-                    std::string_view name, ThreadPool& pool,
-                    const std::function<void()>& progress) {
+WalkMap find_walkable_area(const Occupancy& occupancy, const Person& person, const glm::vec3& start,
+                           std::string_view name, ThreadPool& pool,
+                           const std::function<void()>& progress) {
   const Surfaces surfaces(occupancy, person, pool, progress);
   const std::vector<char> clear = surfaces.with_room(pool);
   Turns turns(progress);
@@ -237,7 +237,7 @@ WalkMap find_ground(const Occupancy& occupancy, const Person& person, const glm:
     throw InputError(name, "", "nobody can stand below its start",
                      "--eye-height has the scene's units; a sidecar can name another start or up");
   Collector collector(surfaces, person, turns);
-  collector.take_ground(below.seed, clear);
+  collector.take_area(below.seed, clear);
   collector.take_obstacles();
   WalkMap map = collector.map(occupancy.grid());
   const glm::vec3 seed = occupancy.grid().to_world(middle_of(surfaces, below.seed));

@@ -1,39 +1,34 @@
-#pragma once
-
-// Clip planes in any core.
-
+// Clip planes.
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
-#include "render_core/frame/renderer.h"
 #include "render_core/scene/keep_if.h"
+#include "tests/render_core/cores/tree_views.h"
 #include "tests/support/catgs_views.h"
 #include "tests/support/rendered.h"
-#include "tests/support/test_scenes.h"
-#include "tests/support/tree_views.h"
 
 namespace catgs::test {
+namespace {
 
-inline std::unique_ptr<Renderer> renderer_of_kind(RendererKind kind, GaussianCloud cloud) {
-  RendererOptions options;
-  options.kind = kind;
-  return make_renderer(std::make_shared<const GaussianCloud>(std::move(cloud)), options).renderer;
+using ClipPlanes = CoreTest;
+
+std::unique_ptr<Renderer> renderer_of(GaussianCloud cloud, RendererKind kind = core) {
+  return core_renderer_of(std::make_shared<const GaussianCloud>(std::move(cloud)), kind);
 }
 
 /// A clipped picture is that of the Gaussians that are left. `pipelines`: those of the core.
-inline void expect_clipped_pictures_to_be_those_of_the_rest(
-    RendererKind kind, const std::vector<Pipeline>& pipelines) {
+void expect_pictures_of_the_rest(RendererKind kind, const std::vector<Pipeline>& pipelines) {
   const ClipPlane clip{{0.4f, 2.0f, -0.2f}, 0.3f};
   const GaussianCloud all = random_cloud(20'000, 1, 5);
   GaussianCloud rest = all;
   keep_if(rest, [&](std::size_t i) { return glm::dot(clip.normal, all.mean[i]) <= clip.offset; });
   ASSERT_LT(rest.size(), 15'000u);
   ASSERT_GT(rest.size(), 5'000u);
-  const auto whole = renderer_of_kind(kind, all), part = renderer_of_kind(kind, std::move(rest));
+  const auto whole = renderer_of(all, kind), part = renderer_of(std::move(rest), kind);
   for (const Pipeline pipeline : pipelines) {
     SCOPED_TRACE(static_cast<int>(pipeline));
     const ViewSettings settings{.pipeline = pipeline};
@@ -47,8 +42,14 @@ inline void expect_clipped_pictures_to_be_those_of_the_rest(
   }
 }
 
-inline void expect_a_clipped_wall_to_hide_nothing(RendererKind kind) {
-  const auto renderer = renderer_of_kind(kind, *wall_before_many());
+TEST_F(ClipPlanes, PicturesAreThoseOfTheRest) {
+  expect_pictures_of_the_rest(
+      core, {Pipeline::vanilla, Pipeline::exact, Pipeline::paper, Pipeline::catgs});
+  expect_pictures_of_the_rest(RendererKind::reference, {Pipeline::exact});
+}
+
+TEST_F(ClipPlanes, AClippedWallHidesNothing) {
+  const auto renderer = renderer_of(*wall_before_many());
   const auto view = renderer->make_view(catgs_settings), exact = renderer->make_view({});
   FrameRequest request = request_at({});
   for (int frame = 0; frame < 3; ++frame) render_in(*view, request);
@@ -59,8 +60,8 @@ inline void expect_a_clipped_wall_to_hide_nothing(RendererKind kind) {
   EXPECT_GE(psnr_db(drawn.rgb, expected.rgb), 45.0);
 }
 
-inline void expect_another_clip_plane_to_end_a_window(RendererKind kind) {
-  const auto renderer = renderer_of_kind(kind, random_cloud(5'000, 0, 5));
+TEST_F(ClipPlanes, AnotherPlaneEndsAWindow) {
+  const auto renderer = renderer_of(random_cloud(5'000, 0, 5));
   const auto view = renderer->make_view({.pipeline = Pipeline::paper});
   FrameRequest request = request_at({});
   request.forecast = Forecast{request.camera.world_from_camera, 4};
@@ -70,15 +71,25 @@ inline void expect_another_clip_plane_to_end_a_window(RendererKind kind) {
   EXPECT_EQ(render_in(*view, request).stats.kind, FrameKind::key);
 }
 
-inline void expect_trees_to_be_clipped(RendererKind kind) {
+TEST_F(ClipPlanes, TreesAreClipped) {
   const TreeScenes scenes;
   FrameRequest request = tree_request(20.0f, 0.0f);
   request.camera.clip = {{0, 1, 0}, 0};
-  const auto of_tree = render_in(*scenes.in_pages(kind)->make_view({}), request);
-  const auto of_cloud = render_in(*scenes.whole(kind)->make_view({}), request);
+  const auto of_tree = render_in(*scenes.in_pages()->make_view({}), request);
+  const auto of_cloud = render_in(*scenes.whole()->make_view({}), request);
   EXPECT_GE(psnr_db(of_tree.rgb, of_cloud.rgb), 50.0);
   request.camera.clip = {};
-  EXPECT_LT(psnr_db(of_tree.rgb, render_in(*scenes.whole(kind)->make_view({}), request).rgb), 30.0);
+  EXPECT_LT(psnr_db(of_tree.rgb, render_in(*scenes.whole()->make_view({}), request).rgb), 30.0);
 }
 
+TEST_F(ClipPlanes, PlanesHaveToBeFinite) {
+  const auto renderer = renderer_of(random_cloud(10, 0, 1));
+  FrameRequest request = request_at({});
+  request.camera.clip.offset = std::numeric_limits<float>::infinity();
+  FrameView frame;
+  EXPECT_EQ(renderer->make_view({})->render(request, frame).code,
+            RenderStatus::Code::invalid_request);
+}
+
+}  // namespace
 }  // namespace catgs::test
