@@ -104,8 +104,8 @@ trap interrupted INT TERM HUP
 trap 'stop_groups TERM' EXIT
 
 # step TITLE COMMAND...: runs the command with its output in the log. TITLE is printed with the
-# time it took; on a terminal a counter runs meanwhile, elsewhere a line tells every half minute that
-# it goes on. A failure shows the end of the log.
+# time it took; on a terminal a counter runs meanwhile, elsewhere a line says every half minute that
+# it still runs. A failure shows the end of the log.
 step() {
   local title=$1
   shift
@@ -311,7 +311,7 @@ build_all() {
 }
 
 # lock_build PRESET: one script at a time builds in build/PRESET of this clone; another one says so
-# and waits. unlock_build lets it go on.
+# and waits. unlock_build ends the wait.
 lock_build() {
   local file=$SOURCE_DIR/build/$1/.lock
   mkdir -p "${file%/*}"

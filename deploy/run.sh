@@ -221,7 +221,7 @@ compose_server_command() {
   server_command+=("${server_options[@]}")
 }
 
-# A wrong value of an option is told before scenes are made and loaded.
+# A wrong value of an option is reported before scenes are made and loaded.
 check_server_options() {
   local message status=0
   # In front: behind an option that lacks its value it would be taken for that.

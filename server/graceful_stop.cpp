@@ -49,7 +49,8 @@ void GracefulStop::begin(std::chrono::milliseconds wait, std::chrono::millisecon
   if (std::exchange(begun_, true)) return;
   parts_->ready = false;
   if (wait == 0ms) return drain(deadline);
-  log_info({.event = "stopping"}, "stopping: not ready any more, clients are told in {} s",
+  log_info({.event = "stopping"},
+           "stopping: not ready any more, clients are asked to reconnect in {} s",
            std::chrono::duration_cast<std::chrono::seconds>(wait).count());
   timer_.expires_after(wait);
   timer_.async_wait([this, deadline](const boost::system::error_code&) { drain(deadline); });
@@ -64,7 +65,8 @@ void GracefulStop::give_up(const std::string& why) {
 }
 
 void GracefulStop::drain(std::chrono::milliseconds deadline) {
-  log_info({.event = "drain"}, "stopping: {} connections are told", parts_->places.connections());
+  log_info({.event = "drain"}, "stopping: {} connections are asked to reconnect",
+           parts_->places.connections());
   parts_->places.drain(deadline);
   parts_->saver.stop();
   when_empty(Clock::now() + deadline, [this] {

@@ -102,7 +102,7 @@ build_server_image() {
   local -a options=()
   if [[ -r ${NODE_EXTRA_CA_CERTS:-} ]]; then  # this machine's way to the npm registry
     build_base=localhost/catgs-build-base
-    # Made once: another image, even of the same content, would begin all layers anew.
+    # Made once: another image, even of the same content, would start again with all layers.
     if ! buildah inspect --type image "$build_base" >/dev/null 2>&1; then
       container=$(buildah from "$base_image")
       buildah config --env NODE_EXTRA_CA_CERTS=/run/extra_ca.crt "$container"

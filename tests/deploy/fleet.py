@@ -224,7 +224,7 @@ class Load:
         report = json.loads(text)
         say(f"catgs-load: {json.dumps({k: v for k, v in report['metrics'].items() if k in ('fps_mean', 'reconnects', 'errors', 'idrs', 'recovery_max_ms', 'recovery_p95_ms')})}")
         kinds = [kind for group in report["groups"] for kind in group["error_counts"]]
-        check(not any("pose" in kind for kind in kinds), f"each session goes on at its own newest pose (errors: {kinds})")
+        check(not any("pose" in kind for kind in kinds), f"each session continues at its own newest pose (errors: {kinds})")
         return report["metrics"]
 
     def judge(self, moved, what):

@@ -261,7 +261,7 @@ class Serving(Machine):
 
     @contextlib.contextmanager
     def serving(self, server):
-        """run.sh while this stand-in of the server goes on."""
+        """run.sh while this stand-in of the server runs."""
         self.stand_in("serves", server)
         (self.folder / "bin/serves").rename(self.bin / "catgs-server")
         with subprocess.Popen([str(self.checkout / "deploy/run.sh"), *self.options()],

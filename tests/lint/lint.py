@@ -124,12 +124,13 @@ BANNED_CALLS = [
 ]
 
 MAX_LINES = 450
+MAX_README_WORDS = 1800
 MAX_IMPORTS = 20
 # A ratchet: these may shrink, never grow, and leave the list when they meet the limit.
 MORE_IMPORTS: dict[str, int] = {}
 
-# Folders whose English is plain. Others follow.
-PLAIN = re.compile(r"^(render_core|tests/(render_core|load|fuzz|bench|support))/")
+# Pages and folders whose English is plain. Others follow.
+PLAIN = re.compile(r"^(render_core|deploy|docker|proto|tests/(render_core|load|fuzz|bench|support|deploy))/|\.md$")
 IDIOMS = re.compile(r"\b(of late|for want of|(is|are|was|were) told|go(es)? on)\b", re.IGNORECASE)
 NO_CLAIM = re.compile(r"(Of|Who|That|What)[A-Z]")
 
@@ -140,7 +141,7 @@ SECURITY_PAGES = ("deploy/SECURITY.md", "deploy/FAULTS.md", "deploy/LIMITS.md")
 MARKER_WORDS = re.compile(r"\b(" + "|".join(a + b for a, b in
                                            [("TO", "DO"), ("FIX", "ME"), ("XX", "X"), ("HA", "CK")]) + r")\b")
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
-MARKDOWN_LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)")
+MARKDOWN_LINK = re.compile(r"\]\((?![a-z]+:)([^)#\s]*)#?([^)\s]*)\)")
 IMPORT = re.compile(r"""(?:\bfrom\s+|\bimport\s+|\bimport\()['"]([^'"]+)['"]""")
 
 
@@ -229,11 +230,18 @@ def english_findings(path: str, lines: list[str]) -> Iterator[str]:
 
 
 def link_findings(root: pathlib.Path, path: str, lines: list[str]) -> Iterator[str]:
-    """Links of a Markdown file that lead to no file, as 'file:line: text'."""
+    """Links of a Markdown file that lead to no file or heading, and a README that is too long, as 'file:line: text'."""
     for number, line in enumerate(lines, start=1):
-        for target in MARKDOWN_LINK.findall(line):
-            if not (root / path).parent.joinpath(target).exists():
+        for target, heading in MARKDOWN_LINK.findall(line):
+            file = (root / path).parent / target if target else root / path
+            if not file.exists():
                 yield f"{path}:{number}: links to {target}, which does not exist"
+            elif heading and heading not in [re.sub(r"[^\w -]", "", text.lower()).replace(" ", "-")
+                                             for text in re.findall(r"^#+ (.+)$", file.read_text("utf-8"), re.MULTILINE)]:
+                yield f"{path}:{number}: {target or path} has no heading #{heading}"
+    words = sum(len(line.split()) for line in lines)
+    if path.endswith("README.md") and words > MAX_README_WORDS:
+        yield f"{path}:1: {words} words, the limit is {MAX_README_WORDS}: split it by what readers ask"
 
 
 def security_findings(page: str, lines: list[str], code: dict[str, str]) -> Iterator[str]:

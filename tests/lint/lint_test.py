@@ -111,7 +111,7 @@ class RuleFindings(unittest.TestCase):
         self.assertEqual(findings("It runs.", "told", path="render_core/a.h"), [])
         for line in ("pages that were missing of late", "drawn for want of them", "It is told so.", "which goes on"):
             self.assertEqual(len(findings("", line)), 1, line)
-            self.assertEqual(findings(line, path="deploy/a.md"), [], "not yet plain")
+            self.assertEqual(findings(line, path="server/a.h"), [], "not yet plain")
         for name in ("OfNothingIsNothing", "WhoIsLateWaits", "ThatIsSo", "WhatIsRead"):
             for declaration in (f"TEST(A, {name}) {{", f"TEST_F(A,\n       {name}) {{"):
                 found = findings("", *declaration.split("\n"), path="tests/load/a.cpp")
@@ -119,11 +119,20 @@ class RuleFindings(unittest.TestCase):
         self.assertEqual(findings("TEST(A, OfferIsTaken) {", path="tests/load/a.cpp"), [])
 
     def test_links(self):
-        root = pathlib.Path(__file__).parent
-        lines = ["[here](lint.py) [web](https://x.org/y) [part](#a)", "![gone](media/gone.webp)"]
-        findings = list(lint.link_findings(root, "README.md", lines))
-        self.assertEqual(len(findings), 1, findings)
-        self.assertIn("README.md:2: links to media/gone.webp", findings[0])
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            page = root / "README.md"
+
+            def findings(*lines):
+                page.write_text("\n".join(lines))
+                return list(lint.link_findings(root, page.name, list(lines)))
+
+            self.assertEqual(findings("## A's `part`, 2", "[here](README.md#as-part-2) [web](https://x.org/y#z) [part](#as-part-2)"), [])
+            self.assertEqual(findings("", "![gone](media/gone.webp)"),
+                             ["README.md:2: links to media/gone.webp, which does not exist"])
+            self.assertEqual(findings("[part](README.md#b)"), ["README.md:1: README.md has no heading #b"])
+            self.assertEqual(findings("word " * lint.MAX_README_WORDS), [])
+            self.assertEqual(len(findings("word " * (lint.MAX_README_WORDS + 1))), 1)
 
     def test_the_security_pages_name_what_is_there(self):
         code = {"server/a.h": "constexpr int max_a = 3;", "tests/a.cpp": "TEST_F(A, IsBounded) {"}
