@@ -33,15 +33,6 @@ export type Messages<T> = {
       : Messages<T[K]>;
 };
 
-/** The keys of `T`, with any texts: what translations are typed against. */
-export type Translation<T> = {
-  readonly [K in keyof T]: T[K] extends string
-    ? string
-    : T[K] extends Plural
-      ? Plural
-      : Translation<T[K]>;
-};
-
 /** `language`: of the catalogue. `locale`: in which numbers are written. */
 export function messages<T extends Catalogue>(
   catalogue: T,

@@ -2,13 +2,13 @@
 // the page starts, and a language that does not come is replaced by English.
 import { catalogue as english } from './generated/en';
 import { choose_language, type Language, type LanguageChoice } from './language';
-import { messages, type Messages, type Translation } from './messages';
+import { messages, type Catalogue, type Messages } from './messages';
 
 export type Texts = Messages<typeof english>;
 
-const translations: Readonly<
-  Record<Exclude<Language, 'en'>, () => Promise<{ default: Translation<typeof english> }>>
-> = {
+type Load = () => Promise<{ default: Catalogue }>;
+
+const translations: Readonly<Record<Exclude<Language, 'en'>, Load>> = {
   de: () => import('../../locales/de.json'),
   fr: () => import('../../locales/fr.json'),
   es: () => import('../../locales/es.json'),
@@ -22,7 +22,7 @@ const translations: Readonly<
 /** `locale`: in which numbers are written. */
 export async function load_texts(language: Language, locale: string): Promise<Texts> {
   if (language === 'en') return messages(english, language, locale);
-  // Tests compare the values in the texts: they are those of English.
+  // A test compares the keys and the values in the texts: they are those of English.
   const translation = (await translations[language]()).default as typeof english;
   return messages(translation, language, locale);
 }
