@@ -3,7 +3,7 @@ import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import { afterEach } from 'vitest';
+import { afterEach, beforeAll } from 'vitest';
 import { WebSocket } from 'ws';
 import type { AnyPage } from './camera';
 import { clean_up } from './clean_up';
@@ -20,27 +20,28 @@ interface Reply {
 
 type Command = (method: string, params: object) => Promise<Record<string, unknown>>;
 
-type Place = readonly [x: number, y: number];
+type Point = readonly [x: number, y: number];
 
 export interface FirefoxPage extends AnyPage {
   readonly errors: string[];
   /** Resolves when the expression is true; fails after a minute. */
   until(expression: string): Promise<void>;
-  /** Clicks the middle of the first element that matches, or a place of the window. */
-  click(where: string | Place): Promise<void>;
-  drag(from: Place, by: Place): Promise<void>;
+  /** Clicks the middle of the first element that matches, or a point of the window. */
+  click(where: string | Point): Promise<void>;
+  drag(from: Point, by: Point): Promise<void>;
   press(key: string): Promise<void>;
   keep_screenshot(name: string): Promise<void>;
 }
 
-let firefox: Promise<Command> | undefined;
+let firefox: Command;
 const errors_of = new Map<string | undefined, string[]>(); // by context
 
+beforeAll(async () => {
+  firefox = await start();
+});
+
 afterEach(async () => {
-  for (const context of errors_of.keys())
-    await (
-      await firefox!
-    )('browsingContext.close', { context });
+  for (const context of errors_of.keys()) await firefox('browsingContext.close', { context });
   errors_of.clear();
 });
 
@@ -50,16 +51,14 @@ export async function open_in_firefox(
   width: number,
   height: number,
 ): Promise<FirefoxPage> {
-  firefox ??= start();
-  const command = await firefox;
-  const { context } = (await command('browsingContext.create', { type: 'tab' })) as {
+  const { context } = (await firefox('browsingContext.create', { type: 'tab' })) as {
     context: string;
   };
   const errors: string[] = [];
   errors_of.set(context, errors);
-  await command('browsingContext.setViewport', { context, viewport: { width, height } });
-  await command('browsingContext.navigate', { context, url, wait: 'complete' });
-  return page_of(command, context, errors);
+  await firefox('browsingContext.setViewport', { context, viewport: { width, height } });
+  await firefox('browsingContext.navigate', { context, url, wait: 'complete' });
+  return page_of(firefox, context, errors);
 }
 
 async function start(): Promise<Command> {
@@ -85,7 +84,7 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
       context,
       actions: [{ type: 'pointer', id: 'mouse', actions }],
     });
-  const move = ([x, y]: Place, duration = 0): object => ({ type: 'pointerMove', x, y, duration });
+  const move = ([x, y]: Point, duration = 0): object => ({ type: 'pointerMove', x, y, duration });
   const [down, up] = ['pointerDown', 'pointerUp'].map((type) => ({ type, button: 0 })) as [
     object,
     object,
@@ -108,7 +107,7 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
       }`;
       const at =
         typeof where === 'string'
-          ? evaluate<Place>(`(${middle})(document.querySelector('${where}'))`)
+          ? evaluate<Point>(`(${middle})(document.querySelector('${where}'))`)
           : where;
       await pointer([move(await at), down, up]);
     },
@@ -135,6 +134,8 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
 /** Returns the address where Firefox listens. */
 function launch(): Promise<string> {
   const profile = mkdtempSync(path.join(tmpdir(), 'catgs-firefox-'));
+  const no_spare_process = 'user_pref("dom.ipc.processPrelaunch.enabled", false);\n';
+  writeFileSync(path.join(profile, 'user.js'), no_spare_process);
   const child = spawn(
     firefox_path,
     [

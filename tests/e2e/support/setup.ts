@@ -1,8 +1,12 @@
 // Runs at the start of each file of browser tests, which share a process and with it a browser.
-import { afterAll, afterEach, inject } from 'vitest';
+import { afterAll, afterEach, beforeEach, inject } from 'vitest';
 import { give_back_pages } from './browser';
-import { end_all } from './clean_up';
+import { begin_test, end_file, end_test } from './clean_up';
 
 process.env['TMPDIR'] = inject('scratch');
-afterEach(({ task }) => give_back_pages(task.result?.state !== 'fail'));
-afterAll(end_all);
+beforeEach(begin_test);
+afterEach(async ({ task }) => {
+  await give_back_pages(task.result?.state !== 'fail');
+  await end_test();
+});
+afterAll(end_file);
