@@ -1,26 +1,30 @@
 // Making a tour in the browser, and saving it to the real server.
-import { mkdirSync, readFileSync, rmSync, unlinkSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, rmSync, unlinkSync } from 'node:fs';
 import path from 'node:path';
 import type { BrowserContextOptions, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import type { Pose } from '#client/camera/eye';
 import { keep_screenshot, open, windows, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { scratch_folder } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'mine.ply');
 const sidecar = path.join(folder, 'mine.json');
-const key_file = path.join(folder, 'key');
 
 let workshop: RunningServer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '20000');
+  catgs_render('synth', 'garden', scene, '--gaussians', '20000');
   unlinkSync(sidecar); // the sidecar of the scene that was just made
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
-  workshop = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
+  workshop = await start_server(scene, [...with_tokens, '--min-fps', '0']);
 });
 
 /** Opens the page by a link of the role. */
@@ -28,8 +32,7 @@ const open_as = (
   role: string,
   query = '',
   options: BrowserContextOptions = windows.desktop,
-): Promise<WatchedPage> =>
-  open(`${workshop.url}${query}#token=${access_token(role, key_file)}`, options);
+): Promise<WatchedPage> => open(`${workshop.url}${query}#token=${access_token(role)}`, options);
 
 describe('an author', () => {
   /** Makes two stops, moves the second one to the front, and lets visits begin there. */

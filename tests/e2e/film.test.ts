@@ -1,22 +1,26 @@
 // Pictures and a film that an author orders from the real server.
-import { readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { scratch_folder, write_tours } from './support/scenes';
 
 const folder = scratch_folder();
-const key_file = path.join(folder, 'key');
 const scene = path.join(folder, 'town.ply');
 
 let server: RunningServer;
 
 beforeAll(async () => {
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
-  catgs_render('synth', 'city', scene, '--gaussians', '20000');
+  catgs_render('synth', 'garden', scene, '--gaussians', '20000');
   write_tours(path.join(folder, 'town.json'), ({ start_pose, focus }) => {
     const at = (share: number): number[] =>
       start_pose.position.map((v, i) => v + (focus[i]! - v) * share);
@@ -29,11 +33,11 @@ beforeAll(async () => {
     });
     return [{ title: 'A short film', stops: [stop(0.1), stop(0.2)] }];
   });
-  server = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
+  server = await start_server(scene, [...with_tokens, '--min-fps', '0']);
 });
 
 const link = (role: string, query = ''): string =>
-  `${server.url}?author${query}#token=${access_token(role, key_file)}`;
+  `${server.url}?author${query}#token=${access_token(role)}`;
 
 async function open_panel(page: Page): Promise<void> {
   await page.getByText('Pictures and film').click();
@@ -101,7 +105,7 @@ it('a film is made for authors alone, within bounds', async () => {
     fetch(`${server.url}api/scenes/town/films`, {
       method: 'PUT',
       body: JSON.stringify(body),
-      headers: { authorization: `Bearer ${access_token(role, key_file)}` },
+      headers: { authorization: `Bearer ${access_token(role)}` },
     });
   const request = { kind: 'film', size: [64, 48], views: [[0, 0, -5, 0, 0, 0, 1, 60], 17_000] };
   expect((await order('viewer', request)).status).toBe(403);

@@ -1,34 +1,30 @@
 // The page in Firefox, against the real server: the demo as deploy/run.sh serves it.
-import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { distance, pose_of, settle } from './support/camera';
 import { open_in_firefox, type FirefoxPage } from './support/firefox';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { crop_streets, make_demo, scratch_folder } from './support/scenes';
 
 const desktop = [1280, 800] as const;
 const phone = [390, 844] as const;
 const folder = scratch_folder();
-const key_file = path.join(folder, 'key');
 
 let server: RunningServer;
 
 beforeAll(async () => {
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   const city = make_demo(folder);
   const streets = path.join(scratch_folder(), 'streets.ply');
   crop_streets(city, streets, -38, 24);
   catgs_render('floors', streets, path.join(folder, 'city.walk'), '--eye-height', '1.6');
-  server = await start_server(city, [
-    '--scene-folder',
-    folder,
-    '--min-fps',
-    '0',
-    '--token-key-file',
-    key_file,
-  ]);
+  server = await start_server(city, ['--scene-folder', folder, '--min-fps', '0', ...with_tokens]);
 });
 
 /** Opens the city. `at`: what the address says of the view. */
@@ -39,7 +35,7 @@ async function open(
   at = '',
 ): Promise<FirefoxPage> {
   const page = await open_in_firefox(
-    `${server.url}?scene=city${query}#token=${access_token(role, key_file)}${at}`,
+    `${server.url}?scene=city${query}#token=${access_token(role)}${at}`,
     ...size,
   );
   await settle(page);

@@ -17,7 +17,7 @@ let server: RunningServer;
 let foreign: OtherSite;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '20000');
+  catgs_render('synth', 'garden', scene, '--gaussians', '20000');
   write_tours(path.join(folder, `${hostile}.json`), ({ focus, start_pose }) => {
     const stop = (number: number) => ({
       title: `${hostile} ${number}`,

@@ -19,7 +19,7 @@ import { start_server } from './support/programs';
 const minutes = Number(process.env['CATGS_USE_MINUTES'] ?? '0.5');
 const looks = Math.max(3, Math.ceil(minutes));
 
-// Half a minute shows some 700 pictures and ten minutes twenty times as many. So this is a hundred bytes
+// Half a minute shows at most 600 pictures and ten minutes twenty times as many. So this is a hundred bytes
 // a picture in half a minute and five in ten. The statistics of two minutes take half of it.
 const most_growth_bytes = 64_000;
 
@@ -105,7 +105,7 @@ class Watched {
 it(
   'memory stays as it is',
   async () => {
-    const server = await start_server('synth:city:20000', ['--min-fps', '0']);
+    const server = await start_server('synth:garden:20000', ['--min-fps', '0']);
     const { page, errors } = await open(server.url);
     const devtools = await page.context().newCDPSession(page);
     const heaps = {

@@ -8,12 +8,17 @@ import { keep_screenshot, new_page, open, type WatchedPage } from './support/bro
 import { settle } from './support/camera';
 import { captions, painted_film, tone } from './support/media_files';
 import { painted_jpeg } from './support/painted';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { scratch_folder } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'hall.ply');
-const key_file = path.join(folder, 'key');
 const windows: Readonly<Record<string, BrowserContextOptions>> = {
   desktop: { viewport: { width: 1280, height: 800 }, colorScheme: 'light' },
   phone: {
@@ -29,17 +34,16 @@ let jpeg: Buffer;
 let film: Buffer;
 
 beforeAll(async () => {
-  catgs_render('synth', 'city', scene, '--gaussians', '20000');
+  catgs_render('synth', 'garden', scene, '--gaussians', '20000');
   unlinkSync(path.join(folder, 'hall.json'));
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
-  server = await start_server(scene, ['--token-key-file', key_file, '--min-fps', '0']);
+  server = await start_server(scene, [...with_tokens, '--min-fps', '0']);
   jpeg = Buffer.from(await painted_jpeg());
   film = await painted_film();
 });
 
 /** The address of the page by a link of the role. */
 const link = (role: string, query = ''): string =>
-  `${server.url}${query}#token=${access_token(role, key_file)}`;
+  `${server.url}${query}#token=${access_token(role)}`;
 
 /** A page whose visitor has not touched it yet, whatever the test has looked at. */
 async function open_untouched(

@@ -1,5 +1,4 @@
 // Portals: from scene to scene and back, against the real server.
-import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -7,18 +6,22 @@ import { barriers } from './support/axe';
 import { keep_screenshot, new_page, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { present } from './support/shared_tour';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { scratch_folder, write_tours } from './support/scenes';
 
 const folder = scratch_folder();
-const key_file = path.join(folder, 'key');
 const file = (name: string): string => path.join(folder, name);
 const arrival = { position: [0.5, -1.5, -6], look_at: [0, 0, 0], fov_deg: 50 };
 
 let server: RunningServer;
 
 beforeAll(async () => {
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
   catgs_render('synth', 'city', file('town.ply'), '--gaussians', '30000');
   catgs_render('synth', 'garden', file('park.ply'), '--gaussians', '30000');
   const stop =
@@ -56,12 +59,13 @@ beforeAll(async () => {
     },
   ]);
   server = await start_server(file('town.ply'), [
-    ...['--scene-folder', folder, '--min-fps', '0', '--token-key-file', key_file],
+    ...['--scene-folder', folder, '--min-fps', '0'],
+    ...with_tokens,
   ]);
 });
 
 const scene_of = (page: Page): Promise<string> => page.locator('#scene-name bdi').innerText();
-const token = (role = 'viewer'): string => `#token=${access_token(role, key_file)}`;
+const token = (role = 'viewer'): string => `#token=${access_token(role)}`;
 
 async function go_to_stop(page: Page, n: number): Promise<void> {
   for (let i = 0; i < n; ++i) await page.getByRole('button', { name: 'Next stop' }).click();

@@ -1,5 +1,4 @@
 // Shared tours: one page presents, others follow its camera or watch its pictures. Against the real server.
-import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -7,17 +6,21 @@ import { barriers } from './support/axe';
 import { keep_screenshot, new_page, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { present } from './support/shared_tour';
-import { access_token, catgs_render, start_server, type RunningServer } from './support/programs';
+import {
+  access_token,
+  catgs_render,
+  start_server,
+  type RunningServer,
+  with_tokens,
+} from './support/programs';
 import { scratch_folder } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'hall.ply');
-const key_file = path.join(folder, 'key');
 const counted = ['--min-fps', '0']; // slots are counted, whatever this machine can do
 
 beforeAll(() => {
   catgs_render('synth', 'city', scene, '--gaussians', '30000');
-  writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
 });
 
 async function move(page: Page): Promise<void> {
@@ -136,17 +139,13 @@ describe('a presentation', () => {
   });
 
   it('grants watching to those without a token, and is found by links of role spectator', async () => {
-    const server: RunningServer = await start_server(scene, [
-      ...counted,
-      '--token-key-file',
-      key_file,
-    ]);
+    const server: RunningServer = await start_server(scene, [...counted, ...with_tokens]);
     const { page: spectator } = await new_page(windows.desktop);
-    await spectator.goto(`${server.url}#token=${access_token('spectator', key_file)}`);
+    await spectator.goto(`${server.url}#token=${access_token('spectator')}`);
     await spectator.getByRole('heading', { name: 'Nobody is presenting here now' }).waitFor();
     await keep_screenshot(spectator, 'together-nobody');
     const { page: host } = await open(
-      `${server.url}#token=${access_token('viewer', key_file)}`,
+      `${server.url}#token=${access_token('viewer')}`,
       windows.desktop,
     );
     const link = await present(host);

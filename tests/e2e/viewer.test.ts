@@ -95,7 +95,7 @@ describe('a visit', () => {
     const { page } = await open(demo.url);
     await choose_full_size(page);
     await page.keyboard.down('ArrowRight');
-    await more_frames(page, 120);
+    await more_frames(page, 60);
     const stats = await stats_of(page);
     await page.keyboard.up('ArrowRight');
     const { motion_to_photon_ms: motion, pose_age_ms: age } = stats;

@@ -1,6 +1,7 @@
 // The real programs: catgs-render, and catgs-server on a port that the system chooses.
 import { execFileSync, spawn, type ChildProcess } from 'node:child_process';
-import { existsSync } from 'node:fs';
+import { existsSync, mkdtempSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
 import path from 'node:path';
 import { clean_up } from './clean_up';
 import { build_dir } from './paths';
@@ -16,12 +17,24 @@ export function catgs_render(...args: string[]): void {
   execFileSync(program('catgs-render'), args, { stdio: ['ignore', 'ignore', 'pipe'] });
 }
 
+const key_file = path.join(mkdtempSync(path.join(tmpdir(), 'catgs-key-')), 'key');
+writeFileSync(key_file, '0123456789abcdef0123456789abcdef');
+
+/** Makes a server take the tokens of access_token(). */
+export const with_tokens = ['--token-key-file', key_file];
+
+const tokens = new Map<string, string>();
+
 /** Makes an access token with `catgs-server token`. */
-export function access_token(role: string, key_file: string): string {
-  const args = ['token', '--role', role, '--token-key-file', key_file];
-  return execFileSync(program('catgs-server'), args, { stdio: ['ignore', 'pipe', 'ignore'] })
-    .toString()
-    .trim();
+export function access_token(role: string): string {
+  const args = ['token', '--role', role, ...with_tokens];
+  const token =
+    tokens.get(role) ??
+    execFileSync(program('catgs-server'), args, { stdio: ['ignore', 'pipe', 'ignore'] })
+      .toString()
+      .trim();
+  tokens.set(role, token);
+  return token;
 }
 
 export interface RunningServer {
