@@ -134,8 +134,6 @@ function page_of(command: Command, context: string, errors: string[]): FirefoxPa
 /** Returns the address where Firefox listens. */
 function launch(): Promise<string> {
   const profile = mkdtempSync(path.join(tmpdir(), 'catgs-firefox-'));
-  const no_spare_process = 'user_pref("dom.ipc.processPrelaunch.enabled", false);\n';
-  writeFileSync(path.join(profile, 'user.js'), no_spare_process);
   const child = spawn(
     firefox_path,
     [
