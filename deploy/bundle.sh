@@ -4,7 +4,8 @@
 #
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
-# DIR is a finished build (default: build/run, else build/release, else build/cuda). FILE is
+# DIR is a finished build (default: build/run, else build/release, else build/cuda); run.sh builds no
+# benchmarks, so a bundle for measurements needs another one. FILE is
 # build/catgs-bundle.tar.xz by default. The archive holds:
 #
 #   bin/               the programs: start them here

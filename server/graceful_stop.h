@@ -36,16 +36,16 @@ class GracefulStop {
   };
   /// From now on signals stop the server.
   void start(const Parts& parts);
-  /// Somebody at a terminal waits for the prompt: clients are told at once, and get a second.
+  /// Somebody at a terminal waits for the prompt: clients move at once, and get a second.
   void begin_quickly();
-  /// This server cannot serve any more: clients are told in the same way.
+  /// This server cannot serve any more: clients move in the same way.
   void give_up(const std::string& why);
   /// Why the server gave up; empty: it was asked to stop.
   [[nodiscard]] const std::string& failure() const { return failure_; }
 
  private:
   void wait_for_signal();
-  /// Ends readiness. Clients are told after `wait` and closed after a further `deadline`.
+  /// Ends readiness. Clients are asked to move after `wait` and closed after a further `deadline`.
   void begin(std::chrono::milliseconds wait, std::chrono::milliseconds deadline);
   void drain(std::chrono::milliseconds deadline);
   /// Calls `then` when no client is connected or saving, at the latest at `deadline`.

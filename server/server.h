@@ -27,11 +27,11 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// Serves until SIGINT, SIGTERM or stop(). Then readiness ends, clients are told, and run()
+  /// Serves until SIGINT, SIGTERM or stop(). Then readiness ends, clients move, and run()
   /// returns when they have left, within two seconds. On SIGTERM, --drain-wait and --drain-deadline
   /// give proxies and clients more time. A second signal ends the process at once.
   ///
-  /// If no device renders any more or the network thread fails, clients are told in the same way.
+  /// If no device renders any more or the network thread fails, clients move in the same way.
   /// run() then throws std::runtime_error. If a thread that serves visitors stalls for minutes, the
   /// process ends with status 1.
   void run();

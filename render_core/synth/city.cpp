@@ -5,11 +5,8 @@
 
 #include "render_core/math/look_at.h"
 #include "render_core/synth/backdrop.h"
-#include "render_core/synth/city_houses.h"
-#include "render_core/synth/city_park.h"
+#include "render_core/synth/city_parts.h"
 #include "render_core/synth/city_plan.h"
-#include "render_core/synth/city_props.h"
-#include "render_core/synth/city_streets.h"
 #include "render_core/synth/plants.h"
 #include "render_core/synth/scenes.h"
 

@@ -1,10 +1,9 @@
-#include "render_core/synth/city_houses.h"
-
 #include <algorithm>
 #include <array>
 
 #include <glm/geometric.hpp>
 
+#include "render_core/synth/city_parts.h"
 #include "render_core/synth/city_wall.h"
 
 namespace catgs::synth {

@@ -1,10 +1,9 @@
-#include "render_core/synth/city_park.h"
-
 #include <array>
 
 #include <glm/geometric.hpp>
 
 #include "render_core/synth/city_ground.h"
+#include "render_core/synth/city_parts.h"
 #include "render_core/synth/plants.h"
 
 namespace catgs::synth {

@@ -1,9 +1,8 @@
-#include "render_core/synth/city_props.h"
-
 #include <array>
 
 #include <glm/geometric.hpp>
 
+#include "render_core/synth/city_parts.h"
 #include "render_core/synth/shapes.h"
 
 namespace catgs::synth {

@@ -1,9 +1,8 @@
-#include "render_core/synth/city_streets.h"
-
 #include <algorithm>
 #include <vector>
 
 #include "render_core/synth/city_ground.h"
+#include "render_core/synth/city_parts.h"
 #include "render_core/synth/shapes.h"
 
 namespace catgs::synth {

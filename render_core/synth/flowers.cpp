@@ -1,8 +1,8 @@
-#include "render_core/synth/flowers.h"
-
 #include <array>
 
 #include <glm/geometric.hpp>
+
+#include "render_core/synth/plants.h"
 
 namespace catgs::synth {
 namespace {

@@ -4,7 +4,6 @@
 
 #include "render_core/math/look_at.h"
 #include "render_core/synth/backdrop.h"
-#include "render_core/synth/flowers.h"
 #include "render_core/synth/plants.h"
 #include "render_core/synth/scenes.h"
 #include "render_core/synth/shapes.h"

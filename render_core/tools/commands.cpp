@@ -2,12 +2,26 @@
 
 #include <CLI/CLI.hpp>
 
+#include "render_core/base/error.h"
+
 namespace catgs {
 
 bool is_quiet(const CLI::App& command) {
   const CLI::App* app = &command;
   while (app->get_parent() != nullptr) app = app->get_parent();
   return app->get_option("--quiet")->count() > 0;
+}
+
+void add_missing_benchmarks(CLI::App& app) {
+  for (const char* name : {"bench", "compare", "paper", "trace"}) {
+    CLI::App* command = app.add_subcommand(name, "Not in this build");
+    command->prefix_command();  // its options are as unknown as itself
+    command->group("Commands that measure, for builds with -DCATGS_BENCHMARKS=ON");
+    command->callback([name] {
+      throw InputError(name, "", "is not in this build of catgs-render",
+                       "add it with: cmake build/run -DCATGS_BENCHMARKS=ON && ninja -C build/run");
+    });
+  }
 }
 
 }  // namespace catgs

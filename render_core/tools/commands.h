@@ -26,16 +26,20 @@ inline constexpr int exit_internal = 3;
 /// The program's --quiet, which every subcommand obeys.
 bool is_quiet(const CLI::App& command);
 
-void add_bench_command(CLI::App& app);
-void add_compare_command(CLI::App& app);
 void add_convert_command(CLI::App& app);
 void add_floors_command(CLI::App& app);
 void add_frames_command(CLI::App& app);
 void add_info_command(CLI::App& app);
-void add_paper_command(CLI::App& app);
 void add_synth_command(CLI::App& app);
+
+// The commands that measure, in builds with CATGS_BENCHMARKS.
+void add_bench_command(CLI::App& app);
+void add_compare_command(CLI::App& app);
+void add_paper_command(CLI::App& app);
 void add_trace_command(CLI::App& app);
 /// A subcommand of `trace`, which adds it.
 void add_trace_windows_command(CLI::App& trace);
+/// In other builds each of these says how to build it.
+void add_missing_benchmarks(CLI::App& app);
 
 }  // namespace catgs

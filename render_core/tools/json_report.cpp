@@ -1,6 +1,7 @@
 #include "render_core/tools/json_report.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/part_file.h"
 

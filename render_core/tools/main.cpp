@@ -25,15 +25,19 @@ int run(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 a requested check failed, 2 bad usage or input, 3 internal error.");
 
-  add_bench_command(app);
-  add_compare_command(app);
   add_convert_command(app);
   add_floors_command(app);
   add_frames_command(app);
   add_info_command(app);
-  add_paper_command(app);
   add_synth_command(app);
+#if CATGS_BENCHMARKS
+  add_bench_command(app);
+  add_compare_command(app);
+  add_paper_command(app);
   add_trace_command(app);
+#else
+  add_missing_benchmarks(app);
+#endif
 
   try {
     parse_command_line(app, argc, argv);

@@ -1,21 +1,23 @@
 #include "render_core/tools/pipeline_options.h"
 
+#include <algorithm>
+#include <initializer_list>
+#include <utility>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
-#include "render_core/tools/parse_name.h"
+#include "render_core/tools/parse_values.h"
 
 namespace catgs {
 namespace {
 
-Pipeline parse_pipeline(std::string_view name) {
-  return parse_name<Pipeline>("--pipeline", name,
-                              {{"exact", Pipeline::exact},
-                               {"vanilla", Pipeline::vanilla},
-                               {"paper", Pipeline::paper},
-                               {"catgs", Pipeline::catgs}});
-}
+const std::initializer_list<std::pair<std::string_view, Pipeline>> pipelines = {
+    {"exact", Pipeline::exact},
+    {"vanilla", Pipeline::vanilla},
+    {"paper", Pipeline::paper},
+    {"catgs", Pipeline::catgs}};
 
 /// Options without effect are refused, because they would spoil a comparison silently.
 void refuse_without_groups(const PipelineOptions& options) {
@@ -80,7 +82,7 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
 
 ViewSettings view_settings(const PipelineOptions& options) {
   ViewSettings settings;
-  settings.pipeline = parse_pipeline(options.pipeline);
+  settings.pipeline = parse_name("--pipeline", options.pipeline, pipelines);
   if (settings.pipeline != Pipeline::paper) refuse_without_groups(options);
   if (!keeps_colours(settings.pipeline)) refuse_without_colours(options);
   SpeculationSettings& speculation = settings.speculation;
@@ -117,17 +119,8 @@ PredictorSettings predictor_settings(const PipelineOptions& options) {
 }
 
 std::string_view pipeline_name(Pipeline pipeline) {
-  switch (pipeline) {
-    case Pipeline::vanilla:
-      return "vanilla";
-    case Pipeline::exact:
-      return "exact";
-    case Pipeline::paper:
-      return "paper";
-    case Pipeline::catgs:
-      break;
-  }
-  return "catgs";
+  return std::ranges::find(pipelines, pipeline, [](const auto& known) { return known.second; })
+      ->first;
 }
 
 }  // namespace catgs

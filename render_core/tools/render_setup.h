@@ -105,4 +105,9 @@ FrameRange parse_frame_range(std::string_view text, std::size_t count);
 /// std::runtime_error.
 void render_or_throw(View& view, const FrameRequest& request, FrameView& frame);
 
+/// Mean squared error of the rendered rgb_f32 frame `i` of the path against the reference, at
+/// `count` random pixels (the same for the same frame of the path).
+double reference_error(const RenderSetup& setup, std::size_t i, const FrameView& frame,
+                       std::size_t count);
+
 }  // namespace catgs

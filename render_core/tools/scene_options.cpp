@@ -11,13 +11,25 @@
 #include "render_core/frame/renderer.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/scene/files/load_scene.h"
-#include "render_core/tools/parse_numbers.h"
+#include "render_core/tools/parse_values.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
 namespace {
 
 constexpr float default_fov_y_deg = 60.0f;
+
+LoadOptions load_options(const SceneOptions& options, int threads, Progress& progress) {
+  LoadOptions load;
+  load.lod = options.lod;
+  load.gaussian_budget = options.budget;
+  load.up = up_of(options);
+  load.model = model_of(options);
+  load.threads = threads;
+  load.progress = [&progress](double fraction) { progress.update(fraction); };
+  return load;
+}
+
 }  // namespace
 
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name) {
@@ -51,21 +63,6 @@ std::optional<glm::vec3> up_of(const SceneOptions& options) {
                      "one of +x, -x, +y, -y, +z and -z; a sidecar takes any direction");
   return up;
 }
-
-namespace {
-
-LoadOptions load_options(const SceneOptions& options, int threads, Progress& progress) {
-  LoadOptions load;
-  load.lod = options.lod;
-  load.gaussian_budget = options.budget;
-  load.up = up_of(options);
-  load.model = model_of(options);
-  load.threads = threads;
-  load.progress = [&progress](double fraction) { progress.update(fraction); };
-  return load;
-}
-
-}  // namespace
 
 Scene load_scene(const SceneOptions& options, int threads, bool quiet) {
   return load_scene(locate_scene(options.path), options, threads, quiet);

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 
@@ -40,6 +41,13 @@ std::string text(const Number& number) {
   const std::size_t whole_begin = digits[0] == '-' ? 1 : 0;
   for (std::size_t i = whole_end; i > whole_begin + 3; i -= 3) digits.insert(i - 3, 1, ',');
   return fmt::format("{}{}", digits, number.unit);
+}
+
+void add_column(PaperTable& table, std::string name, std::initializer_list<Number> numbers) {
+  assert(numbers.size() == table.rows.size());
+  table.columns.push_back(std::move(name));
+  for (std::size_t r = 0; r < numbers.size(); ++r)
+    table.rows[r].numbers.push_back(numbers.begin()[r]);
 }
 
 std::string markdown(const PaperTable& table) {

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <initializer_list>
 #include <limits>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace catgs {
 
@@ -23,18 +24,21 @@ struct Number {
 struct PaperTable {
   struct Row {
     std::string name;
-    std::vector<Number> numbers;  // one per column
+    std::vector<Number> numbers{};  // one per column
   };
 
-  std::string title;   // the subject; "" where the columns say it
-  std::string corner;  // above the names of the rows: what the rows are
-  std::vector<std::string> columns;
-  std::vector<Row> rows;
-  std::vector<std::string> notes;  // how to read the table
+  std::string title{};   // the subject; "" where the columns say it
+  std::string corner{};  // above the names of the rows: what the rows are
+  std::vector<std::string> columns{};
+  std::vector<Row> rows{};
+  std::vector<std::string> notes{};  // how to read the table
 };
 
 /// The number for people, such as "1,234.5 px"; a dash for NaN.
 std::string text(const Number& number);
+
+/// Adds a column with a number for each row.
+void add_column(PaperTable& table, std::string name, std::initializer_list<Number> numbers);
 
 /// A Markdown table followed by its notes.
 std::string markdown(const PaperTable& table);

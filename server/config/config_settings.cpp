@@ -271,7 +271,7 @@ std::vector<Setting> session_settings() {
       number("max-spectators", "N", "Most clients that may watch one session; 0: none",
              &C::max_spectators, 0, 1000),
       number("drain-wait", "SECONDS",
-             "After SIGTERM, time for proxies to see /readyz fail before clients are told",
+             "After SIGTERM, time for proxies to see /readyz fail before clients move",
              &C::drain_wait_s, 0, 600),
       number("drain-deadline", "SECONDS",
              "After --drain-wait, time for clients to move to another server", &C::drain_deadline_s,

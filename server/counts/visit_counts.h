@@ -56,7 +56,7 @@ class VisitCounts {
   [[nodiscard]] std::vector<std::string> dates() const;
   /// Empty: nothing was counted.
   [[nodiscard]] DayCounts day(const std::string& date) const;
-  /// Hands over the counts of a day, which begins anew.
+  /// Hands over the counts of a day, which then start at zero.
   DayCounts take(const std::string& date);
   /// Takes counts back that were handed over.
   void put_back(const std::string& date, const DayCounts& counts);

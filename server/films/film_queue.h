@@ -19,7 +19,7 @@ namespace catgs {
 
 enum class FilmState { waiting, drawing, done, failed, cancelled };
 
-/// The facts of a job that its author is told.
+/// The facts of a job for its author.
 struct FilmReport {
   FilmKind kind = FilmKind::picture;
   std::string owner{};  // id of the token that ordered it: one job at a time for each

@@ -30,7 +30,7 @@ class IdrPolicy {
     useless_without_ = true;
     want_after(least_gap);
   }
-  /// Frames were dropped for want of room. The ring refuses all others until the next IDR.
+  /// Frames were dropped because the ring was full. The ring refuses all others until the next IDR.
   void dropped(TimePoint now) {
     if (!useless_without_)
       drop_gap_ = within(last_drop_, calm, now) ? std::min(2 * drop_gap_, most_gap) : least_gap;

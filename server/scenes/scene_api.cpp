@@ -109,7 +109,7 @@ HttpResponse SceneApi::walkable_area(std::string_view scene_id, std::string_view
                [&](const SceneLibrary::Listing& scene) { return ground_of(scene, if_none_match); });
 }
 
-/// Neither a search that goes on nor a scene without ground is an error, which browsers would
+/// Neither an unfinished search nor a scene without ground is an error, which browsers would
 /// report to visitors who look at the console.
 HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
                                  std::string_view if_none_match) {
@@ -122,7 +122,7 @@ HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
   }
   if (!scene.ground) {
     scenes_.want_ground(scene.id);
-    response = text_response(202, "202: where people can walk here is being found out\n");
+    response = text_response(202, "202: the walkable area is being computed\n");
     response.retry_after_s = retry_after_s;
     return response;
   }

@@ -88,7 +88,7 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   residency_.resize(id, need_of(*book->entry).with(need_of(*loaded.entry)));
   book->former = std::exchange(book->entry, redrawn(*book->entry, *loaded.entry));
   book->tree_lost = false;
-  book->recall();  // jobs go on with the new form
+  book->recall();  // jobs continue with the new form
   changed_ = true;
   log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
            id);

@@ -15,7 +15,7 @@ namespace catgs {
 inline ErrorMessage refusal(SceneResidency::Wish wish, const std::string& id, std::uint64_t bytes) {
   if (wish == SceneResidency::Wish::too_large)
     return {ErrorCode::unknown_scene,
-            fmt::format("the scene \"{}\" takes {:.1f} MB, more than this server has for scenes",
+            fmt::format("the scene \"{}\" needs {:.1f} MB, more than --scene-memory allows",
                         name_in(id), 1e-6 * static_cast<double>(bytes)),
             false};
   if (wish == SceneResidency::Wish::no_room)

@@ -20,7 +20,7 @@ HttpResponse json_response(std::shared_ptr<const std::string> body);
 HttpResponse unauthorized(std::string_view why);
 
 /// Refuses a request to use a scene by a permit that does not allow that, or to save a scene that
-/// is not there; nothing: go on.
+/// is not there; nothing: continue.
 std::optional<HttpResponse> refuse_use(const SceneLibrary& scenes, const Permit& permit,
                                        std::string_view scene_id, Use use);
 

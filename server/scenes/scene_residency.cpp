@@ -23,7 +23,7 @@ SceneResidency::Wish SceneResidency::want(const std::string& id, const SceneNeed
         return use_of(other) != SceneUse::visitors;
       }))
     return Wish::no_room;
-  // A load for a background job gives way soon. Until then, each who asks again is told to wait.
+  // A load for a background job gives way soon. Until then, each who asks again has to wait.
   if (waiting_) return in_background_ ? Wish::awaited : Wish::busy;
   waiting_ = {id, need};
   return Wish::awaited;
@@ -35,7 +35,7 @@ std::optional<SceneResidency::Step> SceneResidency::next(TimePoint now, const Us
     return use_of(id) != SceneUse::visitors;
   };
   if (!room_for(waiting_->need, may_go)) {
-    // A scene to release came into use. Waiting clients ask again and are told.
+    // A scene to release came into use. Waiting clients ask again and get an answer.
     waiting_.reset();
     return std::nullopt;
   }

@@ -85,7 +85,7 @@ class SceneResidency {
   void failed(const std::string& id);
   /// Removes a scene that is gone for another reason.
   void drop(const std::string& id) { residents_.erase(id); }
-  /// The scene takes so much from now on.
+  /// Updates the scene's memory size.
   void resize(const std::string& id, const SceneNeed& need) { residents_.at(id).need = need; }
   /// Records that the scene is in use now.
   void note_use(const std::string& id, TimePoint now);

@@ -47,7 +47,7 @@ class SceneTrees {
   /// The same, as the residency counts it.
   [[nodiscard]] SceneNeed need_of(const FoundScene& scene) const;
 
-  /// Orders a scene's tree, unless it is ordered already, or could not be built or used of late.
+  /// Orders a scene's tree, unless it is ordered already, or could recently not be built or used.
   /// `urgent`: visitors wait for it. Then a build that nobody waits for is cancelled and made
   /// later.
   void order(const FoundScene& scene, bool urgent);

@@ -85,7 +85,7 @@ void SidecarSaver::start_save(const SharedRequest& request) {
         text_response(409, "409: the scene is not in memory: open it, then save\n"));
   if (request->entry->sidecar.empty())
     return request->answer.set_value(
-        text_response(409, "409: this scene is no file: there is nowhere to save beside it\n"));
+        text_response(409, "409: this scene is generated, so there is no file to save beside\n"));
   busy_ = true;
   boost::asio::post(writer_, [this, request] {
     Outcome outcome;
@@ -116,7 +116,7 @@ SidecarSaver::Outcome SidecarSaver::refuse_outdated(const Request& request,
                                 media_origins_);
   } catch (const InputError& broken) {
     log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
-                "scene {}: goes on as it was: {}", request.scene_id, broken.what());
+                "scene {}: stays as it was: {}", request.scene_id, broken.what());
   }
   return refused;
 }

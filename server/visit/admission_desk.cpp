@@ -207,7 +207,7 @@ void AdmissionDesk::ask_waiting(TimePoint now) {
     if (measuring_ || (room == Room::no && now - since >= around_.options.policy.overtaken_at_most))
       return;
     if (room == Room::no) continue;
-    // It leaves the queue, admitted or refused, or is told to wait on.
+    // It leaves the queue, admitted or refused, or has to wait longer.
     turn_ = id;
     visit.ask_again(now);
     turn_.clear();

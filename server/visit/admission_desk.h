@@ -32,7 +32,7 @@ class AdmissionDesk {
   void on_newcomer(TimePoint now);
   /// The place takes no room any more and leaves the queue.
   void leave(Place& place, TimePoint now);
-  /// Asks waiting clients that would find room now to try again. The others are told their
+  /// Asks waiting clients that would find room now to try again. The others receive their
   /// position.
   void admit_waiting(TimePoint now);
   void on_tick(TimePoint now);

@@ -28,7 +28,7 @@ Welcome for_spectators(Welcome welcome) {
 
 void Audience::attach(std::shared_ptr<ClientConnection> connection) {
   if (visitor_)
-    visitor_->dismiss(CloseCode::going_away, "the session goes on in another connection");
+    visitor_->dismiss(CloseCode::going_away, "the session continues in another connection");
   address_ = connection->connection().peer_address();
   visitor_ = std::move(connection);
 }
@@ -44,8 +44,8 @@ void Audience::close(CloseCode code, std::string_view reason) {
 void Audience::send(const ServerMessage& message, TimePoint now) {
   if (visitor_) visitor_->connection().send(wire::serialize(message));
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    // Its company greets anew, if it wants to see what the visitor presents there. Each gets a
-    // visit of its own where its own link allows that, and watches otherwise.
+    // Its company sends a new hello, if it wants to see what the visitor presents there. Each gets
+    // a visit of its own where its own link allows that, and watches otherwise.
     if (!is_in(welcome->scene.scene_id)) {
       end_presentation(true);
       presentation_.forget_camera();

@@ -64,7 +64,7 @@ void MachineUse::control_effort(const PlaceList& places, int admitted, TimePoint
     around_.metrics.effort_changes.Increment();
     const LogScope about(encoders[index]->facts());
     log_debug({.event = "encoder_effort"},
-              "libx264 goes on with {}, {} threads: processors {:.0f} % busy",
+              "libx264 continues with {}, {} threads: processors {:.0f} % busy",
               effort_presets[static_cast<std::size_t>(effort.preset)].name, effort.threads,
               100.0 * busy_);
     encoders[index]->visit().stream().plan().use_effort(effort);

@@ -30,7 +30,7 @@ class Admissions {
   virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
   /// `from`, the place's visitor, follows another session from now on, or none.
   virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
-  /// The place's visitor follows nobody any more, and is told so.
+  /// The place's visitor follows nobody any more, and gets a message.
   virtual void stop_following(Place& place) = 0;
   /// The place that leads this follower; null: none does.
   virtual Place* leader_of(const ClientConnection& follower) = 0;
@@ -115,7 +115,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   Audience audience_;
   VisitTally tally_;
   RateLimit pings_, preparations_, shared_tours_;
-  RateLimit refusals_;  // that are told: a flood costs neither answers nor lines of the log
+  RateLimit refusals_;  // that get an answer: a flood costs neither answers nor lines of the log
 };
 
 /// Returns null if no place has this id.

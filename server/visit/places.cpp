@@ -97,8 +97,8 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
   const auto choice = desk_.choose(hello);
   const auto* scene_id = std::get_if<std::string>(&choice);
   if (!scene_id || !known.visit().life().resumable()) return false;
-  // The session's own scene is in memory. A client that selects another scene starts anew and may
-  // have to wait.
+  // The session's own scene is in memory. A client that selects another scene begins a new session
+  // and may have to wait.
   auto found = desk_.find_scene(*scene_id, now);
   auto* scene = std::get_if<std::shared_ptr<const SceneEntry>>(&found);
   if (!scene) return false;

@@ -10,7 +10,7 @@
 
 namespace catgs {
 
-/// A visit that leads others: its followers, and what they are told. Followers have visits of their
+/// A visit that leads others: its followers, and what they receive. Followers have visits of their
 /// own and get the leader's camera. Session thread only.
 class Presentation {
  public:

@@ -21,8 +21,8 @@ class StreamControl {
   bool begin(Admission admission, const Hello& hello);
   /// Switches to another scene. open() must follow.
   void enter_scene(std::shared_ptr<const SceneEntry> scene);
-  /// Goes on with another form of the same scene, between two frames. The client need not know. If
-  /// that form cannot be opened, the stream keeps the one that it has.
+  /// Continues with another form of the same scene, between two frames. The client need not know.
+  /// If that form cannot be opened, the stream keeps the one that it has.
   void redraw(std::shared_ptr<const SceneEntry> scene);
   /// Opens the stream, or reopens it as soon as it is ready().
   void open();
@@ -55,7 +55,7 @@ class StreamControl {
   /// The device that it renders on, if devices have numbers.
   [[nodiscard]] std::optional<int> device() const { return device_; }
   [[nodiscard]] EncoderKind encoder_kind() const { return encoder_.kind; }
-  /// The configuration that the client was told last.
+  /// The configuration that the client received last.
   [[nodiscard]] const StreamConfig& config() const { return config_; }
   [[nodiscard]] PicturePlan& plan() { return plan_; }
   [[nodiscard]] const PicturePlan& plan() const { return plan_; }

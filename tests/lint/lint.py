@@ -130,7 +130,7 @@ MAX_IMPORTS = 20
 MORE_IMPORTS: dict[str, int] = {}
 
 # Pages and folders whose English is plain. Others follow.
-PLAIN = re.compile(r"^(render_core|deploy|docker|proto|tests/(render_core|load|fuzz|bench|support|deploy))/|\.md$")
+PLAIN = re.compile(r"^(render_core|server|deploy|docker|proto|tests/(render_core|load|fuzz|bench|support|deploy))/|\.md$")
 IDIOMS = re.compile(r"\b(of late|for want of|(is|are|was|were) told|go(es)? on)\b", re.IGNORECASE)
 NO_CLAIM = re.compile(r"(Of|Who|That|What)[A-Z]")
 

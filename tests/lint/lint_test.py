@@ -111,7 +111,7 @@ class RuleFindings(unittest.TestCase):
         self.assertEqual(findings("It runs.", "told", path="render_core/a.h"), [])
         for line in ("pages that were missing of late", "drawn for want of them", "It is told so.", "which goes on"):
             self.assertEqual(len(findings("", line)), 1, line)
-            self.assertEqual(findings(line, path="server/a.h"), [], "not yet plain")
+            self.assertEqual(findings(line, path="web_client/a.ts"), [], "not yet plain")
         for name in ("OfNothingIsNothing", "WhoIsLateWaits", "ThatIsSo", "WhatIsRead"):
             for declaration in (f"TEST(A, {name}) {{", f"TEST_F(A,\n       {name}) {{"):
                 found = findings("", *declaration.split("\n"), path="tests/load/a.cpp")

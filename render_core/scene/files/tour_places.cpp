@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/math/camera.h"

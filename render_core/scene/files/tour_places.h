@@ -1,6 +1,6 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "render_core/scene/edit/edit_scene.h"
 #include "render_core/scene/files/hints.h"

@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <nlohmann/json.hpp>
 
 #include "render_core/scene/formats/json_field.h"
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/math/camera.h"
@@ -108,10 +109,12 @@ JsonField JsonField::operator[](std::size_t index) const {
   return JsonField(file_, fmt::format("{}[{}]", path_, index), value_->at(index));
 }
 
-float JsonField::number() const {
+float JsonField::number() const { return static_cast<float>(precise_number()); }
+
+double JsonField::precise_number() const {
   if (!value_->is_number()) fail("is not a number");
-  const auto number = static_cast<float>(value_->get<double>());
-  if (!std::isfinite(number)) fail("is out of range");
+  const auto number = value_->get<double>();
+  if (!std::isfinite(static_cast<float>(number))) fail("is out of range");
   return number;
 }
 

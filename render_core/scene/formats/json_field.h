@@ -10,7 +10,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "render_core/scene/formats/byte_source.h"
 
@@ -38,7 +38,8 @@ class JsonField {
   [[nodiscard]] std::size_t size() const;                       // of an array
   [[nodiscard]] JsonField operator[](std::size_t index) const;  // of an array; below its size
 
-  [[nodiscard]] float number() const;  // finite
+  [[nodiscard]] float number() const;           // finite
+  [[nodiscard]] double precise_number() const;  // finite as a float too
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::string text() const;
   [[nodiscard]] glm::vec3 vec3() const;
@@ -57,10 +58,7 @@ class JsonField {
   [[nodiscard]] std::array<double, Size> doubles() const {
     if (size() != Size) fail("is not an array of " + std::to_string(Size) + " numbers");
     std::array<double, Size> numbers;
-    for (std::size_t i = 0; i < Size; ++i) {
-      static_cast<void>((*this)[i].number());  // checks it
-      numbers[i] = (*this)[i].value().template get<double>();
-    }
+    for (std::size_t i = 0; i < Size; ++i) numbers[i] = (*this)[i].precise_number();
     return numbers;
   }
 

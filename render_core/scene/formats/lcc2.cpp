@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/copy_gaussians.h"

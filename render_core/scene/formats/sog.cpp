@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/copy_gaussians.h"

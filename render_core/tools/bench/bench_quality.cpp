@@ -12,7 +12,6 @@
 #include "render_core/base/part_file.h"
 #include "render_core/image/png.h"
 #include "render_core/tools/frame_feed.h"
-#include "render_core/tools/reference_check.h"
 
 namespace catgs {
 namespace {

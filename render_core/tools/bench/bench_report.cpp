@@ -4,6 +4,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/build_info.h"
 #include "render_core/metrics/summary.h"
@@ -174,6 +175,16 @@ void print_quality(const QualityReport& quality, bool groups) {
   }
 }
 
+void print_pages(const Measurement& measurement, float detail_px) {
+  const PageUsage pages = measurement.pages();
+  fmt::print("{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail",
+             detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
+             pages.missing_max > 0 ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
+  const Summary sharp = summarize(measurement.sharp_ms);
+  fmt::print("{:<14}{:.0f} ms after a jump to a new place, {:.0f} ms at most\n", "sharp",
+             sharp.mean, sharp.max);
+}
+
 }  // namespace
 
 double BenchResult::ns_per_gaussian(const RenderSetup& setup) const {
@@ -224,20 +235,6 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
   json["quality"] = result.quality ? to_json(*result.quality) : Json();
   return json;
 }
-
-namespace {
-
-void print_pages(const Measurement& measurement, float detail_px) {
-  const PageUsage pages = measurement.pages();
-  fmt::print("{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail",
-             detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
-             pages.missing_max > 0 ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
-  const Summary sharp = summarize(measurement.sharp_ms);
-  fmt::print("{:<14}{:.0f} ms after a jump to a new place, {:.0f} ms at most\n", "sharp",
-             sharp.mean, sharp.max);
-}
-
-}  // namespace
 
 void print_report(const RenderSetup& setup, const BenchResult& result) {
   const Measurement& measurement = result.measurement;

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "render_core/tools/bench/bench_measure.h"
 #include "render_core/tools/bench/bench_quality.h"

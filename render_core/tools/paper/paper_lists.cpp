@@ -77,18 +77,17 @@ void add_tiles(PaperTable& table, PaperCase& scene, const Variant& variant) {
     }
   });
   loads.finish();
-  table.columns.push_back(fmt::format("{} {}", scene.label(), variant.name));
   const double slices = tasks > 0.0 ? tasks / static_cast<double>(frames) : Number::nothing;
-  const std::array<Number, 9> column = {Number{loads.tiles(), 0},
-                                        Number{loads.mean(), 1},
-                                        Number{loads.percentile(0.5), 0},
-                                        Number{loads.percentile(0.9), 0},
-                                        Number{loads.percentile(0.99), 0},
-                                        Number{loads.percentile(1.0), 0},
-                                        Number{loads.busiest_percent(), 1, " %"},
-                                        Number{loads.long_percent(), 1, " %"},
-                                        Number{slices, 0}};
-  for (std::size_t i = 0; i < column.size(); ++i) table.rows[i].numbers.push_back(column[i]);
+  add_column(table, fmt::format("{} {}", scene.label(), variant.name),
+             {{loads.tiles(), 0},
+              {loads.mean(), 1},
+              {loads.percentile(0.5), 0},
+              {loads.percentile(0.9), 0},
+              {loads.percentile(0.99), 0},
+              {loads.percentile(1.0), 0},
+              {loads.busiest_percent(), 1, " %"},
+              {loads.long_percent(), 1, " %"},
+              {slices, 0}});
 }
 
 }  // namespace
@@ -118,8 +117,7 @@ PaperTable list_table(PaperCase& scene) {
   const Measurement exact = pooled(scene.runs(variants::exact));
   const double growth = key_list_growth(scene.runs(variants::paper), scene.runs(variants::exact),
                                         [](const FrameStats&) { return true; });
-  PaperTable table{.title = {},
-                   .corner = "List length (10³)",
+  PaperTable table{.corner = "List length (10³)",
                    .columns = {scene.label()},
                    .rows = {{"3DGS", {length(vanilla)}},
                             {"Exact", {length(exact)}},
@@ -143,9 +141,7 @@ PaperTable list_table(PaperCase& scene) {
 
 PaperTable tiles_table(PaperCase& scene) {
   PaperTable table{
-      .title = {},
       .corner = "Load of the tiles",
-      .columns = {},
       .rows = {{"Tiles", {}},
                {"Mean list", {}},
                {"50 % of the tiles hold at most", {}},

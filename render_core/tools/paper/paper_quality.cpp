@@ -116,10 +116,7 @@ class PhotoJudge {
 
   [[nodiscard]] PaperTable table() const {
     PaperTable table{
-        .title = {},
-        .corner = {},
         .columns = quality_columns(scene_.label()),
-        .rows = {},
         .notes = {fmt::format(
             "{}: against {} of {} photographs (llffhold {}) of {}; {} of them were reached by a "
             "sub-frame at {:g} photographs a second.",
@@ -195,8 +192,6 @@ PaperTable quality_by_exact(PaperCase& scene) {
   });
   judge_variant(variants::ours, [&](const QualityReport& report) { ours.add(report.key); });
   return {
-      .title = {},
-      .corner = {},
       .columns = quality_columns(scene.label()),
       .rows = {quality_row("3DGS", vanilla), quality_row("Paper-key", key),
                quality_row("Paper-sub", sub), quality_row("Ours", ours)},

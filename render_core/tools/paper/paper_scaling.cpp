@@ -23,8 +23,7 @@ PaperTable scaling_table(PaperCase& scene) {
     return Number{paper.frame_ms(kind).empty() ? Number::nothing : paper.mean_stage_ms(which, kind),
                   3};
   };
-  return {.title = {},
-          .corner = "Means over the frames",
+  return {.corner = "Means over the frames",
           .columns = {scene.label()},
           .rows = {{"Gaussians (10³)", {{1e-3 * gaussians, 0}}},
                    {"In view (10³)", {{1e-3 * exact.list_length().visible_mean}}},

@@ -63,8 +63,7 @@ PaperTable::Row speedups(std::string name, const Measurement& run, const Measure
 
 PaperTable fps_table(PaperCase& scene) {
   const Number vanilla = fps(scene, variants::vanilla), ours = fps(scene, variants::ours);
-  return {.title = {},
-          .corner = "Average FPS",
+  return {.corner = "Average FPS",
           .columns = {scene.label()},
           .rows = {{"Model size", {{static_cast<double>(scene.setup().cloud->size()), 0}}},
                    {"3DGS", {vanilla}},
@@ -80,10 +79,8 @@ PaperTable fps_table(PaperCase& scene) {
 
 PaperTable ablation_table(PaperCase& scene) {
   PaperTable table{.title = scene.label(),
-                   .corner = {},
                    .columns = {"Average FPS", "of Full", "Flatness", "p99 ms", "Key frame ms",
                                "Sub-frame ms", "Frames per key", "Keys without window"},
-                   .rows = {},
                    .notes = {std::string(fps_note)}};
   const double full_fps = pooled(scene.runs(variants::ours)).fps();
   const auto add = [&](std::string name, const Variant& variant) {
@@ -130,7 +127,6 @@ PaperTable stages_table(PaperCase& scene) {
   PaperTable table{
       .title = scene.label(),
       .corner = "Speed-up",
-      .columns = {},
       .rows = {speedups("3DGS", vanilla, vanilla, std::nullopt),
                speedups("Exact", exact, vanilla, std::nullopt),
                speedups("Paper-key", paper, vanilla, FrameKind::key),
@@ -146,19 +142,18 @@ PaperTable stages_table(PaperCase& scene) {
 }
 
 PaperTable pruned_table(PaperCase& scene) {
-  PaperTable table{.title = {},
-                   .corner = "Average FPS",
-                   .columns = {},
+  PaperTable table{.corner = "Average FPS",
                    .rows = {{"Size (10³)", {}}, {"3DGS", {}}, {"Exact", {}}, {"Ours", {}}},
                    .notes = {std::string(fps_note),
                              "Pruned as by convert --keep-fraction: what is kept has the largest "
                              "opacity times projected area, the mean over all directions."}};
   const auto add = [&table](PaperCase& kept, double fraction) {
-    table.columns.push_back(fmt::format("{} {:g} %", kept.label(), 100.0 * fraction));
     const double thousands = 1e-3 * static_cast<double>(kept.setup().cloud->size());
-    const std::array<Number, 4> column = {Number{thousands}, fps(kept, variants::vanilla),
-                                          fps(kept, variants::exact), fps(kept, variants::ours)};
-    for (std::size_t i = 0; i < column.size(); ++i) table.rows[i].numbers.push_back(column[i]);
+    add_column(table, fmt::format("{} {:g} %", kept.label(), 100.0 * fraction),
+               {{thousands},
+                fps(kept, variants::vanilla),
+                fps(kept, variants::exact),
+                fps(kept, variants::ours)});
   };
   for (const double fraction : scene.options().keep_fractions) {
     if (fraction == 1.0) {

@@ -39,10 +39,8 @@ void add(QualityReport& all, const QualityReport& report) {
 PaperTable traces_table(PaperCase& scene) {
   PaperTable table{
       .title = scene.label(),
-      .corner = {},
       .columns = {"Exact FPS", "Paper FPS", "Ours FPS", "Ours over Exact", "Flatness", "p99 ms",
                   "Mean dB", "Worst frame dB", "Worst block dB", "0.1 % block dB", "See-through"},
-      .rows = {},
       .notes = {fmt::format(
           "Quality is that of ours against Exact at the same poses, one frame in {}: PSNR. "
           "See-through is the largest share of a picture's pixels that more than half of the "

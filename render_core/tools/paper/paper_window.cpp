@@ -110,8 +110,6 @@ WindowColumn with_window(PaperCase& scene, int window, const std::vector<Measure
 PaperTable window_table(PaperCase& scene) {
   PaperTable table{
       .title = scene.label(),
-      .corner = {},
-      .columns = {},
       .rows = {{"List length (10³)", {}},
                {"Over Exact", {}},
                {"Mean trail (px)", {}},
@@ -124,10 +122,8 @@ PaperTable window_table(PaperCase& scene) {
           "same poses.",
           "Mean trail: of the centres of the Gaussians in the picture, over the window."}};
   const auto add = [&table](std::string name, const WindowColumn& c) {
-    table.columns.push_back(std::move(name));
-    const std::array<Number, 6> column = {c.list, c.growth, c.mean_trail,
-                                          c.held, c.p99_ms, c.max_ms};
-    for (std::size_t i = 0; i < column.size(); ++i) table.rows[i].numbers.push_back(column[i]);
+    add_column(table, std::move(name),
+               {c.list, c.growth, c.mean_trail, c.held, c.p99_ms, c.max_ms});
   };
   const std::vector<Measurement>& exact = scene.runs(variants::exact);
   add("Exact", without_window(exact, exact));

@@ -12,7 +12,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/math/camera.h"
-#include "render_core/tools/parse_numbers.h"
+#include "render_core/tools/parse_values.h"
 
 namespace catgs {
 namespace {

@@ -14,7 +14,6 @@
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/progress.h"
-#include "render_core/tools/reference_check.h"
 #include "render_core/tools/render/frame_layers.h"
 #include "render_core/tools/render/frame_sink.h"
 #include "render_core/tools/render_setup.h"

@@ -55,6 +55,11 @@ TraceCheck check(const TraceOptions& options, const LoadedScene& loaded,
                      make_lens(options.lens, loaded.scene.hints.near_z), pool);
 }
 
+void print_checked(const std::string& file, const TraceCheck& result) {
+  fmt::print("{}: {} frames, {:.1f} % of them see enough, all in or around the scene\n", file,
+             result.frames, 100.0 * result.seeing_frames);
+}
+
 void write_checked(const TraceOptions& options, const LoadedScene& loaded,
                    const Trajectory& trajectory, bool quiet) {
   const TraceCheck result = check(options, loaded, trajectory);
@@ -66,8 +71,7 @@ void write_checked(const TraceOptions& options, const LoadedScene& loaded,
   if (!result.valid()) {
     fmt::print(stderr, "catgs-render: {}: {}\n", options.out, result.complaint());
   } else if (!quiet) {
-    fmt::print("{}: {} frames, {:.1f} % of them see enough, all in or around the scene\n",
-               options.out, result.frames, 100.0 * result.seeing_frames);
+    print_checked(options.out, result);
   }
 }
 
@@ -180,8 +184,7 @@ void add_check(CLI::App& trace) {
     if (!result.valid()) {
       throw CheckFailed(fmt::format("{}: {}", options->trace, result.complaint()));
     }
-    fmt::print("{}: {} frames, {:.1f} % of them see enough, all in or around the scene\n",
-               options->trace, result.frames, 100.0 * result.seeing_frames);
+    print_checked(options->trace, result);
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/motion/camera_path.h"
@@ -82,10 +83,7 @@ void add_groups(const RenderSetup& setup, float nearest_depth, Groups& sum) {
 PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajectory>& traces,
                          const std::vector<Rule>& all_rules, Progress& progress) {
   PaperTable table{
-      .title = {},
       .corner = "Frames per key frame",
-      .columns = {},
-      .rows = {},
       .notes = {fmt::format("No window: share of the key frames. {} traces, {} at {:g} px, nearest "
                             "depth {:g}.",
                             traces.size(), options.lens.size, *options.lens.focal_px,
@@ -96,7 +94,7 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
   }
   for (const Rule& rule : all_rules) {
     const PipelineOptions pipeline = with_flags(options.pipeline, rule.flags);
-    PaperTable::Row& row = table.rows.emplace_back(PaperTable::Row{rule.name, {}});
+    PaperTable::Row& row = table.rows.emplace_back(PaperTable::Row{rule.name});
     for (const double rate_hz : options.rates_hz) {
       Groups sum;
       for (const Trajectory& trace : traces) {

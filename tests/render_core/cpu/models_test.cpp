@@ -64,7 +64,7 @@ void PrintTo(const SurfelView& view, std::ostream* out) { *out << view.name; }
 
 class Surfels : public ::testing::TestWithParam<SurfelView> {};
 
-// Our flat Gaussians are an approximation. README.md has these figures.
+// Our flat Gaussians are an approximation. render_core/FRAMES.md has these figures.
 TEST_P(Surfels, AsFlatGaussiansAreNearThoseThatRaysMeet) {
   const GaussianCloud cloud = test::surfel_room();
   FrameRequest request;

@@ -1,12 +1,14 @@
 #include <cmath>
 #include <limits>
 
+#include <CLI/CLI.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
 #include "render_core/tools/bench/bench_measure.h"
 #include "render_core/tools/bench/bench_quality.h"
+#include "render_core/tools/commands.h"
 #include "render_core/tools/pipeline_options.h"
 #include "render_core/tools/render_setup.h"
 #include "render_core/tools/scene_hash.h"
@@ -16,6 +18,16 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
+
+TEST(MissingBenchmarks, AreListedAndSayHowToAddThem) {
+  CLI::App app;
+  add_missing_benchmarks(app);
+  for (const std::string command : {"bench", "compare", "paper", "trace"}) {
+    EXPECT_THAT(app.help(), HasSubstr(command));
+    EXPECT_THAT([&] { app.parse(command + " anchor --unknown 1 city.ply"); },
+                ThrowsMessage<InputError>(HasSubstr("-DCATGS_BENCHMARKS=ON")));
+  }
+}
 
 TEST(ParseSize, TakesWidthAndHeight) {
   EXPECT_EQ(parse_size("--size", "1920x1080"), glm::ivec2(1920, 1080));

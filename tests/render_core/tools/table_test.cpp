@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/tools/paper/paper_case.h"

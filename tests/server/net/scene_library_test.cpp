@@ -144,7 +144,7 @@ TEST_F(SceneLibraryTest, RefusesWhatIsTooLargeOrBroken) {
   start();
   v1::Error error = refusal("palace");
   EXPECT_EQ(error.code(), v1::Error::UNKNOWN_SCENE);
-  EXPECT_THAT(error.message(), HasSubstr("takes 2.1 MB, more than this server has"));
+  EXPECT_THAT(error.message(), HasSubstr("needs 2.1 MB, more than --scene-memory allows"));
   error = refusal("ruin");
   EXPECT_EQ(error.code(), v1::Error::UNKNOWN_SCENE);
   EXPECT_THAT(error.message(), HasSubstr("could not be loaded"));

@@ -187,7 +187,7 @@ TEST_F(SceneTreesTest, ASceneThatDoesNotFitWaitsForItsTree) {
   start();
   const auto answer = library_->want(id("b"), now_);
   ASSERT_TRUE(std::holds_alternative<ErrorMessage>(answer));
-  EXPECT_THAT(std::get<ErrorMessage>(answer).message, HasSubstr("more than this server has"));
+  EXPECT_THAT(std::get<ErrorMessage>(answer).message, HasSubstr("more than --scene-memory allows"));
 }
 
 TEST_F(SceneTreesTest, OneTreeIsBuiltAtATime) {

@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
 
 #include "render_core/reference/reference.h"
 #include "render_core/scene/files/tour_places.h"

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/json_field.h"
