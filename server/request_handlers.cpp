@@ -17,11 +17,12 @@ StaticFiles find_client(const std::string& client_dir) {
 RequestHandlers::RequestHandlers(Parts around)
     : parts(std::move(around)),
       scenes(parts.scenes, parts.authorize),
-      media({parts.scenes,
+      media({parts.scenes, parts.background,
              [this](std::string_view token_id) { return parts.access.ended(token_id); },
              parts.access.own_key(), unix_now_s}),
-      saver(parts.scenes, parts.io, parts.config.media_origins),
-      films({parts.io, [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
+      saver(parts.scenes, parts.background, parts.io, parts.config.media_origins),
+      films({parts.io, parts.background,
+             [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
              [this] { return parts.places.anybody_looks(); },
              [this](std::string_view token_id) { return parts.access.ended(token_id); }}) {
   if (parts.book)

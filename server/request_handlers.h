@@ -30,6 +30,7 @@ struct RequestHandlers {
   /// All outlive the handlers.
   struct Parts {
     boost::asio::io_context& io;  // runs the session thread
+    Background& background;
     const ServerConfig& config;
     SceneLibrary& scenes;
     AccessControl& access;

@@ -79,18 +79,22 @@ DayCounts read_counts(const ByteSource& file) {
   return day;
 }
 
-VisitBook::VisitBook(fs::path folder, VisitCounts& counts, std::chrono::milliseconds save_interval)
-    : folder_(std::move(folder)), counts_(counts) {
+VisitBook::VisitBook(fs::path folder, VisitCounts& counts, Background& background,
+                     std::chrono::milliseconds save_interval)
+    : folder_(std::move(folder)), counts_(counts), jobs_(background) {
   if (folder_.empty()) return;
   lock_.emplace(own_folder("--visit-counts", folder_, "visits.lock"));
   drop_old_days();
-  thread_ = std::jthread([this, save_interval](const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    do {
-      wake_.wait_for(lock, stop, save_interval, [] { return false; });
-      save();
-    } while (!stop.stop_requested());
-  });
+  jobs_.start(lanes::visit_counts, Priority::normal,
+              [this, save_interval, waited = false](const std::stop_token&) mutable {
+                if (std::exchange(waited, true)) save();
+                return std::optional<Clock::duration>(save_interval);
+              });
+}
+
+VisitBook::~VisitBook() {
+  jobs_.end();
+  if (!folder_.empty()) save();
 }
 
 fs::path VisitBook::file_of(const std::string& date) const {

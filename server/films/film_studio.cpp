@@ -4,13 +4,11 @@
 #include <span>
 #include <utility>
 
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "server/base/log_event.h"
-#include "server/base/prompt_thread.h"
 #include "server/films/film_artist.h"
 
 namespace catgs {
@@ -19,11 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto longest_job = 2h;
-constexpr auto look_again = 20ms;
 constexpr auto ask_again = 250ms;  // for a scene
-
-/// Thrown by the artist's callback.
-struct Cancelled {};
 
 HttpResponse json_response(int status, const nlohmann::json& document) {
   return text_response(status,
@@ -36,15 +30,6 @@ HttpResponse no_such_job() {
 }
 
 }  // namespace
-
-FilmStudio::FilmStudio(Surroundings around)
-    : around_(std::move(around)), artist_([this](const std::stop_token& stop) { work(stop); }) {}
-
-FilmStudio::~FilmStudio() {
-  artist_.request_stop();
-  clerk_.join();
-  artist_.join();
-}
 
 HttpResponse FilmStudio::result(std::string_view id) {
   const auto job = find(id);
@@ -95,14 +80,16 @@ std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string ow
                                             std::shared_ptr<const UploadPlace> place) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
-  boost::asio::post(clerk_, [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
-                             json = std::move(json), place = std::move(place)]() mutable {
-    if (place->abandoned()) return;
-    HttpResponse response = take(std::move(scene_id), std::move(owner), json);
-    std::string().swap(json);
-    place.reset();  // it is free before the answer comes
-    answer->set_value(std::move(response));
-  });
+  // An order is too long to be read on the network thread.
+  jobs_.start(lanes::film_requests, Priority::normal,
+              [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
+               json = std::move(json), place = std::move(place)](const auto&) mutable {
+                if (place->abandoned()) return;
+                HttpResponse response = take(std::move(scene_id), std::move(owner), json);
+                std::string().swap(json);
+                place.reset();  // it is free before the answer comes
+                answer->set_value(std::move(response));
+              });
   return future;
 }
 
@@ -124,23 +111,10 @@ HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std
   boost::asio::post(around_.io, [queue = queue_, lease = around_.lease, scene_id, id] {
     if (const auto held = lease(scene_id, false).lease) queue->found_scene(id, held->content());
   });
-  {
-    const std::lock_guard lock(mutex_);  // so that the artist does not miss it
-  }
-  wake_.notify_all();
+  jobs_.start(lanes::films, Priority::normal, [this](const std::stop_token& stop) {
+    if (const auto job = queue_->start_next()) draw(*job, stop);
+  });
   return json_response(202, {{"id", id}});
-}
-
-void FilmStudio::work(const std::stop_token& stop) {
-  run_in_background();
-  while (!stop.stop_requested()) {
-    std::optional<FilmJob> job;
-    {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock, stop, [&] { return (job = queue_->start_next()).has_value(); });
-    }
-    if (job) draw(*job, stop);
-  }
 }
 
 void FilmStudio::check(const FilmJob& job, double share, const std::stop_token& stop) {
@@ -162,8 +136,7 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
     draw_film(job.wish, take, *file, [&](double share, Clock::duration took) {
       check(job, done = share, stop);
       if (Clock::now() - started > longest_job) throw NotDrawn("it takes longer than two hours");
-      std::unique_lock lock(mutex_);
-      if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
+      if (around_.visitors_look()) sleep_unless_stopped(took, stop);
     });
     queue_->finish(job.id, file);
   } catch (const Cancelled&) {
@@ -180,7 +153,8 @@ LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::option
                                    const std::stop_token& stop) {
   const TimePoint begun = Clock::now();
   while (true) {
-    const LeasedScene scene = ask_for_scene(job, content.has_value(), stop);
+    const LeasedScene scene = ask_session_thread(
+        around_.io, stop, [&] { return around_.lease(job.scene_id, content.has_value()); });
     if (scene.lease && content && scene.lease->content() != *content)
       throw NotDrawn("the scene's file has changed meanwhile: order again");
     if (scene.lease) return scene;
@@ -189,22 +163,9 @@ LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::option
     if (Clock::now() - begun >= around_.longest_wait)
       throw NotDrawn(
           "visitors of other scenes need the memory of this one: order again when it is quieter");
-    std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, stop, ask_again, [] { return false; });
-    lock.unlock();
+    sleep_unless_stopped(ask_again, stop);
     check(job, share, stop);
   }
-}
-
-LeasedScene FilmStudio::ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop) {
-  auto answer = std::make_shared<std::promise<LeasedScene>>();
-  auto future = answer->get_future();
-  boost::asio::post(around_.io, [lease = around_.lease, id = job.scene_id, again, answer] {
-    answer->set_value(lease(id, again));
-  });
-  while (future.wait_for(look_again) != std::future_status::ready)
-    if (stop.stop_requested()) throw Cancelled();
-  return future.get();
 }
 
 }  // namespace catgs

@@ -4,11 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
@@ -16,10 +14,9 @@
 #include "render_core/walk/eye_height.h"
 #include "render_core/walk/walk_file.h"
 #include "render_core/walk/walkable_area.h"
-#include "server/access/signed_token.h"
+#include "server/scenes/derived_files.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_ids.h"
-#include "server/scenes/tree_cache.h"
 
 namespace catgs {
 namespace {
@@ -118,16 +115,12 @@ std::string compute_ground(const GroundSource& source, int threads,
 
 std::string ground_name(const GroundSource& source) {
   constexpr int version = 1;  // of what is found in a scene
-  const std::string spec = spec_of(source);
-  const std::string scene = is_synthetic(spec) ? spec : tree_name(source.scene, source.levels);
-  const TokenDigest digest = digest_of(fmt::format(
-      "{}\n{} {} {}\n{} {} {}\n{} {}", scene, source.start.x, source.start.y, source.start.z,
-      source.up.x, source.up.y, source.up.z, source.metres_per_unit, version));
-  constexpr std::size_t digest_bytes = 16;
-  const TokenDigest of_scene = digest_of(spec);
-  return fmt::format("{:02x}-{:02x}.walk",
-                     fmt::join(std::span(of_scene).first(ground_scene_digits / 2), ""),
-                     fmt::join(std::span(digest).first(digest_bytes), ""));
+  const SceneLocation& scene = source.scene;
+  const std::string files = is_synthetic(spec_of(source)) ? "" : tree_name(scene, source.levels);
+  const std::string facts = fmt::format("{}\n{} {} {}\n{} {} {}\n{} {}", files, source.start.x,
+                                        source.start.y, source.start.z, source.up.x, source.up.y,
+                                        source.up.z, source.metres_per_unit, version);
+  return derived_name(scene, facts, ".walk");
 }
 
 }  // namespace catgs

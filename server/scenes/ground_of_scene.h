@@ -38,9 +38,8 @@ struct NoGround : InputError {
 std::string compute_ground(const GroundSource& source, int threads,
                            const std::function<void()>& progress);
 
-/// A name for that: it changes with the scene's files and with what else `source` says. It begins
-/// with digits that all names of one scene have in common. Throws InputError.
+/// See derived_name(): it changes with the scene's files and with what else `source` says. Throws
+/// InputError.
 std::string ground_name(const GroundSource& source);
-inline constexpr std::size_t ground_scene_digits = 16;
 
 }  // namespace catgs

@@ -11,7 +11,7 @@
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
 #include "server/media/media_folder.h"
-#include "server/scenes/tree_cache.h"
+#include "server/scenes/derived_files.h"
 
 namespace catgs {
 namespace {

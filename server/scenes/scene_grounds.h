@@ -1,15 +1,14 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/thread_pool.hpp>
 
+#include "server/base/background.h"
+#include "server/scenes/derived_files.h"
 #include "server/scenes/ground_of_scene.h"
 
 namespace catgs {
@@ -20,14 +19,14 @@ struct SceneGround {
   std::string etag{};
 };
 
-/// Finds the grounds of scenes, one at a time, on few threads of low priority. What is found stays
-/// in the folder of the trees, if there is one. The functions run on the session thread.
+/// Finds the grounds of scenes in the background, one at a time. What is found stays in the folder
+/// of the trees, if there is one. The functions run on the session thread.
 class SceneGrounds {
  public:
-  /// `folder`: --cache-dir; it belongs to this process already. Empty: nothing is kept.
-  SceneGrounds(std::filesystem::path folder, int threads, boost::asio::io_context& io)
-      : folder_(std::move(folder)), threads_(threads), io_(io) {}
-  ~SceneGrounds();  // cancels the search under way and waits for its end
+  /// `files`: null: nothing is kept.
+  SceneGrounds(const DerivedFiles* files, int threads, Background& background,
+               boost::asio::io_context& io)
+      : files_(files), threads_(threads), jobs_(background, io) {}
 
   [[nodiscard]] bool busy() const { return busy_; }
   /// Takes the author's file, or the one in the folder, or computes one. `found` is called on the
@@ -36,21 +35,18 @@ class SceneGrounds {
             std::function<void(std::shared_ptr<const SceneGround>)> found);
 
   static constexpr std::size_t max_file_bytes = 8 << 20;  // served to pages
-  static constexpr std::size_t max_kept = 256;            // in the folder
-  static constexpr std::size_t max_kept_of_scene = 4;     // as authors save it again and again
 
  private:
-  [[nodiscard]] std::string find_now(const std::string& scene_id, const GroundSource& source) const;
+  [[nodiscard]] std::string find_now(const std::string& scene_id, const GroundSource& source,
+                                     const std::stop_token& stop) const;
   [[nodiscard]] std::string kept_or_computed(const std::string& scene_id,
-                                             const GroundSource& source) const;
-  void keep(const std::filesystem::path& path, const std::string& bytes) const;
+                                             const GroundSource& source,
+                                             const std::stop_token& stop) const;
 
-  const std::filesystem::path folder_;
+  const DerivedFiles* const files_;
   const int threads_;
-  boost::asio::io_context& io_;
   bool busy_ = false;
-  std::atomic<bool> cancelled_{false};
-  boost::asio::thread_pool finder_{1};
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <boost/asio/post.hpp>
-
 #include "server/base/log_event.h"
 
 namespace catgs {
@@ -35,7 +33,7 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
   Tick tick;
   for (auto& [id, book] : shelf_.books()) {
     if (book.former_is_left()) {
-      free_later(std::exchange(book.former, nullptr));
+      loader_.free_later(std::exchange(book.former, nullptr));
       residency_.resize(id, need_of(*book.entry));
       changed_ = true;
     }
@@ -66,13 +64,10 @@ void SceneRedrawing::start(const std::string& id) {
   busy_ = true;
   const SceneBook& book = *shelf_.find(id);
   residency_.resize(id, need_of(*book.entry).with(trees_.need_of(book.found)));
-  boost::asio::post(loader_, [this, id, found = book.found, before = book.entry->renderer,
-                              form = *trees_.form_of(book.found)] {
-    auto loaded = std::make_shared<LoadedScene>(load_(found, form));
-    boost::asio::post(io_, [this, id, found, loaded, before] {
-      on_loaded(id, found, std::move(*loaded), before);
-    });
-  });
+  loader_.load(book.found, *trees_.form_of(book.found), SceneLoader::For::visitors,
+               [this, id, found = book.found, before = book.entry->renderer](LoadedScene loaded) {
+                 on_loaded(id, found, std::move(loaded), before);
+               });
 }
 
 void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, LoadedScene loaded,
@@ -84,7 +79,7 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   if (!loaded.entry) return trees_.give_up(found, loaded.error);
   const bool still_wanted = book && book->entry && book->entry->renderer == before &&
                             book->found.tree == found.tree && !book->outdated;
-  if (!still_wanted) return free_later(std::move(loaded.entry));
+  if (!still_wanted) return loader_.free_later(std::move(loaded.entry));
   residency_.resize(id, need_of(*book->entry).with(need_of(*loaded.entry)));
   book->former = std::exchange(book->entry, redrawn(*book->entry, *loaded.entry));
   book->tree_lost = false;
@@ -92,10 +87,6 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   changed_ = true;
   log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
            id);
-}
-
-void SceneRedrawing::free_later(std::shared_ptr<const SceneEntry> entry) {
-  boost::asio::post(loader_, [entry = std::move(entry)]() mutable { entry.reset(); });
 }
 
 }  // namespace catgs

@@ -62,6 +62,7 @@ class VisitBookTest : public testing::Test {
   }
 
   const TemporaryFolder folder_;
+  Background background_;
   std::atomic<std::int64_t> now_s_{noon};
   VisitCounts counts_{[this] { return now_s_.load(); }};
   VisitsPage::Titles titles_;
@@ -69,7 +70,7 @@ class VisitBookTest : public testing::Test {
 
 TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
   {
-    const VisitBook book(folder_.path(), counts_);
+    const VisitBook book(folder_.path(), counts_, background_);
     counts_.visit("hall \"A\"", DeviceKind::tablet);
     counts_.spend("hall \"A\"", 12.5, 1'000'000'000'000);
     counts_.reach("hall \"A\"", {1, 2});
@@ -77,7 +78,7 @@ TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
     counts_.visit("garden", DeviceKind::headset);
   }
   EXPECT_TRUE(counts_.dates().empty()) << "what is in a file is in memory no more";
-  const VisitBook book(folder_.path(), counts_);
+  const VisitBook book(folder_.path(), counts_, background_);
   EXPECT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
   const SceneCounts hall = book.day(today).at("hall \"A\"");
   EXPECT_EQ(hall.visits, 1u);
@@ -91,7 +92,7 @@ TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
 }
 
 TEST_F(VisitBookTest, WithoutAFolderCountsStayInMemory) {
-  const VisitBook book({}, counts_);
+  const VisitBook book({}, counts_, background_);
   counts_.visit("hall", DeviceKind::tablet);
   EXPECT_THAT(book.dates(), ElementsAre(today));
   EXPECT_EQ(book.day(today).at("hall").visits, 1u);
@@ -103,11 +104,11 @@ TEST_F(VisitBookTest, ADayWithinAllLimitsIsReadAgain) {
     counts_.visit(std::string(120, 'x') + std::to_string(i), DeviceKind::unknown);
   for (std::uint32_t i = 0; i < VisitCounts::most_stops + 5; ++i)
     counts_.reach(first, {i / 256, i % 256});
-  { const VisitBook book(folder_.path(), counts_); }
+  { const VisitBook book(folder_.path(), counts_, background_); }
   counts_.visit("one more", DeviceKind::unknown);
   counts_.reach(first, {1'000, 0});
-  { const VisitBook book(folder_.path(), counts_); }
-  const DayCounts day = VisitBook(folder_.path(), counts_).day(today);
+  { const VisitBook book(folder_.path(), counts_, background_); }
+  const DayCounts day = VisitBook(folder_.path(), counts_, background_).day(today);
   EXPECT_EQ(day.size(), VisitCounts::most_scenes + 1);
   EXPECT_EQ(day.at(std::string(VisitCounts::other_scenes)).visits, 6u);
   EXPECT_EQ(day.at(first).stops.size(), VisitCounts::most_stops);
@@ -117,7 +118,7 @@ TEST_F(VisitBookTest, TheStartReadsNoDay) {
   std::ofstream(file_of("2025-11-24")) << R"({"scenes":{"hall":{"visits":-1}}})";
   ASSERT_EQ(::mkfifo(file_of("2025-11-23").c_str(), 0600), 0);
   std::ofstream(folder_ / "visits-notes.json") << "of somebody else";
-  const VisitBook book(folder_.path(), counts_);
+  const VisitBook book(folder_.path(), counts_, background_);
   EXPECT_TRUE(fs::exists(file_of("2025-11-24")));
   EXPECT_THAT(book.dates(), ElementsAre("2025-11-23", "2025-11-24"));
   for (const std::string& date : book.dates()) {
@@ -132,7 +133,7 @@ TEST_F(VisitBookTest, OldDaysAreDeleted) {
   for (std::size_t i = 0; i < VisitCounts::most_days + 3; ++i)
     std::ofstream(file_of(date_of(noon - static_cast<std::int64_t>(i) * day_s))) << "{}";
   {
-    const VisitBook book(folder_.path(), counts_);
+    const VisitBook book(folder_.path(), counts_, background_);
     EXPECT_EQ(book.dates().size(), VisitCounts::most_days);
     now_s_ += day_s;
     counts_.visit("hall", DeviceKind::unknown);
@@ -145,14 +146,14 @@ TEST_F(VisitBookTest, AFolderServesOneServerAtATime) {
   const auto refused = [&](const fs::path& folder) -> std::string {
     try {
       VisitCounts counts([] { return noon; });
-      const VisitBook book(folder, counts);
+      const VisitBook book(folder, counts, background_);
     } catch (const InputError& error) {
       return error.what();
     }
     return "";
   };
   {
-    const VisitBook book(folder_.path(), counts_);
+    const VisitBook book(folder_.path(), counts_, background_);
     EXPECT_THAT(refused(folder_.path()),
                 AllOf(HasSubstr("--visit-counts"), HasSubstr("another server")));
   }
@@ -170,18 +171,18 @@ TEST_F(VisitBookTest, ADayThatCannotBeWrittenWaits) {
   fs::create_directories(file_of(today).string() + ".damaged/inside");
   fs::create_directories(file_of(today) / "inside");
   {
-    const VisitBook book(folder_.path(), counts_);
+    const VisitBook book(folder_.path(), counts_, background_);
     counts_.visit("hall", DeviceKind::unknown);
   }
   EXPECT_EQ(counts_.day(today).at("hall").visits, 1u);
   fs::remove_all(file_of(today));
-  { const VisitBook book(folder_.path(), counts_); }
-  EXPECT_EQ(VisitBook(folder_.path(), counts_).day(today).at("hall").visits, 1u);
+  { const VisitBook book(folder_.path(), counts_, background_); }
+  EXPECT_EQ(VisitBook(folder_.path(), counts_, background_).day(today).at("hall").visits, 1u);
 }
 
 TEST_F(VisitBookTest, ADayThatCannotBeOpenedNowIsReadLater) {
   std::ofstream(file_of(today)) << counts_json({{"hall", {.visits = 1}}});
-  const VisitBook book(folder_.path(), counts_);
+  const VisitBook book(folder_.path(), counts_, background_);
   {
     const DescriptorLimit none_is_left(next_descriptor());
     EXPECT_THROW((void)book.day(today), InputError);
@@ -198,7 +199,7 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
   std::atomic<std::uint64_t> all{0};
   std::atomic<bool> ended{false}, grows{true};
   {
-    const VisitBook book(folder_.path(), counts_, 1ms);
+    const VisitBook book(folder_.path(), counts_, background_, 1ms);
     const auto visit = [&](std::uint32_t visitor) {
       TimePoint now = TimePoint{} + 1h;
       for (std::uint32_t i = 0; !ended; ++i, ++all) {
@@ -226,7 +227,7 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
     for (std::thread& thread : threads) thread.join();
   }
   EXPECT_TRUE(grows) << "a day lost visits for a while";
-  const VisitBook book(folder_.path(), counts_);
+  const VisitBook book(folder_.path(), counts_, background_);
   ASSERT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
   const SceneCounts before = book.day(today).at("hall"), after = book.day("2025-11-26").at("hall");
   EXPECT_EQ(before.visits + after.visits, all);
@@ -241,7 +242,7 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
 }
 
 TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
-  const VisitBook book({}, counts_);
+  const VisitBook book({}, counts_, background_);
   const VisitsPage pages = page_of(book);
   counts_.visit("<hall>", DeviceKind::desktop);
   counts_.spend("<hall>", 7200.0, 3'000'000'000);
@@ -270,7 +271,7 @@ TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
 }
 
 TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
-  const VisitBook book({}, counts_);
+  const VisitBook book({}, counts_, background_);
   const VisitsPage pages = page_of(book);
   counts_.visit("=1+\"1\"", DeviceKind::desktop);
   counts_.reach("=1+\"1\"", {0, 0});
@@ -286,7 +287,7 @@ TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
   const auto write = [&](const char* date, const char* scene) {
     std::ofstream(file_of(date)) << counts_json({{scene, {.visits = 1, .stops = {{{0, 0}, 1}}}}});
   };
-  const VisitBook book(folder_.path(), counts_);
+  const VisitBook book(folder_.path(), counts_, background_);
   const VisitsPage pages = page_of(book);
   const std::map<std::string, std::function<HttpResponse()>> documents = {
       {"charts", [&] { return charts(pages, {"days=4"}); }},
@@ -310,7 +311,7 @@ TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
 }
 
 TEST_F(VisitBookTest, PiecesOfALongPageHaveALargestSize) {
-  const VisitBook book({}, counts_);
+  const VisitBook book({}, counts_, background_);
   for (std::uint32_t i = 0; i < VisitCounts::most_stops; ++i)
     counts_.reach("hall", {i / 256, i % 256});
   const VisitsPage pages = page_of(book);

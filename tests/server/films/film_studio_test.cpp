@@ -42,7 +42,7 @@ class FilmStudioTest : public testing::Test {
   }
   void start(std::chrono::milliseconds longest_wait = 10min) {
     studio.emplace(FilmStudio::Surroundings{
-        io,
+        io, background,
         [this](const std::string&, bool again) {
           asked_again = asked_again || again;
           return there ? leased(scene, leases, content) : LeasedScene{.gone = gone};
@@ -87,6 +87,7 @@ class FilmStudioTest : public testing::Test {
   bool there = true, gone = false, asked_again = false;
   int content = 0;
   std::atomic<const char*> revoked{""};
+  Background background;
   boost::asio::io_context io;
   std::optional<FilmStudio> studio;
 };

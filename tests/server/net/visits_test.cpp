@@ -25,8 +25,9 @@ using testing::Not;
 class Visits : public testing::Test {
  protected:
   Visits() {
+    Background background;
     VisitCounts counts([this] { return day_s_; });
-    const VisitBook book(folder_.path(), counts);
+    const VisitBook book(folder_.path(), counts, background);
     for (int day = 0; day < 5; ++day, day_s_ -= 86'400)
       for (std::uint32_t stop = 0; stop < 2000; ++stop) counts.reach("hall", {0, stop});
   }

@@ -55,8 +55,8 @@ class SceneGroundsTest : public FolderTest {
     library_.reset();  // which takes the cache with it
     io_.emplace();     // and what the library has asked of it
     library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, *io_,
-        metrics_, [this] { return now_; });
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
+        *io_, metrics_, [this] { return now_; });
   }
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 120'000 && !holds(); ++i) {
@@ -91,6 +91,7 @@ class SceneGroundsTest : public FolderTest {
     return files;
   }
 
+  Background background_;
   std::optional<boost::asio::io_context> io_;
   Metrics metrics_;
   ServerConfig config_;
@@ -146,37 +147,6 @@ TEST_F(SceneGroundsTest, APipeInPlaceOfAFileIsReplaced) {
   const Ground ground = found();
   ASSERT_TRUE(fs::is_regular_file(file));
   EXPECT_EQ(bytes_in(file), *ground->file);
-}
-
-TEST_F(SceneGroundsTest, OfManyThoseThatWereUsedLastStay) {
-  start();
-  constexpr int others = 300;
-  for (int i = 0; i < others; ++i) {
-    const fs::path file = write(fmt::format("cache/{}.walk", i), "");
-    fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(others - i));
-  }
-  load();
-  found();
-  EXPECT_EQ(kept().size(), SceneGrounds::max_kept);
-  constexpr int gone = others + 1 - static_cast<int>(SceneGrounds::max_kept);
-  EXPECT_FALSE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone - 1)));
-  EXPECT_TRUE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone)));
-}
-
-TEST_F(SceneGroundsTest, SavesOfOneSceneDropNoFilesOfOthers) {
-  save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
-  start();
-  const fs::path other = write("cache/other.walk", "");
-  fs::last_write_time(other, fs::file_time_type::clock::now() - std::chrono::hours(1));
-  auto saved = std::make_shared<SceneEntry>(*load());
-  for (std::size_t i = 0; i < 2 * SceneGrounds::max_kept_of_scene; ++i) {
-    saved = std::make_shared<SceneEntry>(*saved);
-    saved->facts.about.metres_per_unit = 1.0f + static_cast<float>(i);
-    library_->revise(id(), saved);
-    found();
-  }
-  EXPECT_EQ(kept().size(), SceneGrounds::max_kept_of_scene + 1);
-  EXPECT_TRUE(fs::exists(other));
 }
 
 TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
