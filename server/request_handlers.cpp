@@ -25,8 +25,8 @@ RequestHandlers::RequestHandlers(Parts around)
              [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
              [this] { return parts.places.anybody_looks(); },
              [this](std::string_view token_id) { return parts.access.ended(token_id); }}) {
-  if (parts.book)
-    visits.emplace(*parts.book, unix_now_s, [this](const std::string& scene_id) {
+  if (parts.statistics)
+    visits.emplace(*parts.statistics, unix_now_s, [this](const std::string& scene_id) {
       const auto listing = parts.scenes.listing();
       const auto scene = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
       return scene != listing->end() && scene->tours ? scene->tours->titles : nullptr;

@@ -41,7 +41,7 @@ struct RequestHandlers {
     const std::atomic<bool>& ready;
     Metrics& metrics;
     const StaticFiles& client;
-    const VisitBook* book;  // null: visits are not counted
+    const UsageStatistics* statistics;  // null: visits are not counted
   };
   explicit RequestHandlers(Parts around);
 

@@ -19,7 +19,7 @@
 #include "server/base/metrics.h"
 #include "server/base/prompt_thread.h"
 #include "server/base/watchdog.h"
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 #include "server/frame_path.h"
 #include "server/graceful_stop.h"
 #include "server/net/net_server.h"
@@ -82,7 +82,7 @@ struct Server::State {
   boost::asio::io_context io{1};  // outlives the pool of the core, whose tasks post to it
   RendererOptions core;           // all scenes' Views are counted in one set of devices
   std::optional<VisitCounts> counts;
-  std::optional<VisitBook> book;
+  std::optional<UsageStatistics> statistics;
   std::unique_ptr<SceneLibrary> scenes;
   std::vector<EncoderChoice> encoders;
   std::unique_ptr<FramePath> frames;
@@ -140,8 +140,8 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   State& s = *state_;
   if (s.config.visit_counts != "off") {
     s.counts.emplace(unix_now_s);
-    s.book.emplace(s.config.visit_counts == "memory" ? "" : s.config.visit_counts, *s.counts,
-                   *s.background);
+    s.statistics.emplace(s.config.visit_counts == "memory" ? "" : s.config.visit_counts, *s.counts,
+                         *s.background);
   }
   s.scenes = std::make_unique<SceneLibrary>(s.config, s.core, *s.background, s.io, s.metrics);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
@@ -168,7 +168,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
                    s.counts ? &*s.counts : nullptr, [&s] { return s.access.revoked_links(); }});
   s.handlers.emplace(RequestHandlers::Parts{
       s.io, *s.background, s.config, *s.scenes, s.access, authorize, *s.places, *s.core.devices,
-      s.liveness, s.ready, s.metrics, s.client, s.book ? &*s.book : nullptr});
+      s.liveness, s.ready, s.metrics, s.client, s.statistics ? &*s.statistics : nullptr});
   s.router.emplace(public_routes(), *s.handlers);
   s.admin_router.emplace(admin_routes(), *s.handlers);
 }

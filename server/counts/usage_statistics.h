@@ -22,16 +22,16 @@ DayCounts read_counts(const ByteSource& file);
 /// The counts of all days. A folder keeps them, in a file for each day:
 /// "visits-2026-11-25.json". What was counted is added to it once a minute, in the background, and
 /// at the end. To forget a day, delete its file while no server runs.
-class VisitBook {
+class UsageStatistics {
  public:
   /// `folder`: empty: counts stay in memory. It is made if needed, and belongs to this process as
-  /// long as the book exists. Files of days that are too long ago are deleted. No day is read.
-  /// Throws InputError where the folder cannot be used. `counts` outlives the book.
-  VisitBook(std::filesystem::path folder, VisitCounts& counts, Background& background,
-            std::chrono::milliseconds save_interval = std::chrono::minutes(1));
-  ~VisitBook();
-  VisitBook(const VisitBook&) = delete;
-  VisitBook& operator=(const VisitBook&) = delete;
+  /// long as the statistics exists. Files of days that are too long ago are deleted. No day is
+  /// read. Throws InputError where the folder cannot be used. `counts` outlives this object.
+  UsageStatistics(std::filesystem::path folder, VisitCounts& counts, Background& background,
+                  std::chrono::milliseconds save_interval = std::chrono::minutes(1));
+  ~UsageStatistics();
+  UsageStatistics(const UsageStatistics&) = delete;
+  UsageStatistics& operator=(const UsageStatistics&) = delete;
 
   /// The days that have counts, oldest first. Any thread. May block.
   [[nodiscard]] std::vector<std::string> dates() const;
