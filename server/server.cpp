@@ -146,7 +146,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   s.scenes = std::make_unique<SceneLibrary>(s.config, s.core, *s.background, s.io, s.metrics);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
-    const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };
+    const auto resolve = [&s](auto name) { return s.scenes->resolve(name); };
     return s.access.permit(token, unix_now_s(), resolve);
   };
   VisitOptions options = visit_options(s.config);

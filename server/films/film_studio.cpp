@@ -94,13 +94,13 @@ std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string ow
 }
 
 HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std::string& json) {
-  FilmWish wish;
+  FilmRequest request;
   try {
-    wish = parse_film_wish(json);
+    request = parse_film_request(json);
   } catch (const InputError& mistake) {
     return text_response(400, fmt::format("400: {}\n", mistake.what()));
   }
-  const auto added = queue_->add(scene_id, std::move(owner), std::move(wish));
+  const auto added = queue_->add(scene_id, std::move(owner), std::move(request));
   if (const auto* refused = std::get_if<FilmQueue::Refused>(&added))
     return refused->has_one
                ? text_response(409, "409: you have ordered one already: wait for it or cancel it\n")
@@ -133,7 +133,7 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   };
   try {
     const auto file = std::make_shared<ResultFile>();
-    draw_film(job.wish, take, *file, [&](double share, Clock::duration took) {
+    draw_film(job.request, take, *file, [&](double share, Clock::duration took) {
       check(job, done = share, stop);
       if (Clock::now() - started > longest_job) throw NotDrawn("it takes longer than two hours");
       if (around_.visitors_look()) sleep_unless_stopped(took, stop);

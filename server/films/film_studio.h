@@ -47,7 +47,7 @@ class FilmStudio {
   /// Returns a refusal unless the job waits or is being drawn.
   std::optional<HttpResponse> refuse_cancel(std::string_view id);
   HttpResponse cancel(std::string_view id);
-  /// Takes an order (film_wish.h); answers 202 with {"id": JOB}. The caller has checked that the
+  /// Takes an order (film_request.h); answers 202 with {"id": JOB}. The caller has checked that the
   /// sender may save the scene. `owner`: id of its token. One whose place is abandoned meanwhile
   /// orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,

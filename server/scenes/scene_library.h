@@ -38,8 +38,8 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::string default_scene() const override { return shelf_.default_scene(); }
   [[nodiscard]] std::vector<std::string> scene_ids() const override { return shelf_.scene_ids(); }
   /// Any thread. See SceneShelf.
-  [[nodiscard]] std::string resolve(std::string_view wish) const override {
-    return shelf_.resolve(wish);
+  [[nodiscard]] std::string resolve(std::string_view name) const override {
+    return shelf_.resolve(name);
   }
   [[nodiscard]] bool has(const std::string& id) const override {
     return shelf_.books().contains(id);

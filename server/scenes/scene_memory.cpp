@@ -45,9 +45,9 @@ SceneMemory::SceneMemory(const ServerConfig& config, SceneShelf& shelf, SceneTre
 void SceneMemory::load_now(const std::string& id) {
   const FoundScene& found = shelf_.books().at(id).found;
   const TimePoint now = clock_();
-  const auto wish = residency_.want(id, trees_.need_of(found), now, use_of_);
-  if (wish != SceneResidency::Wish::awaited)
-    throw InputError("--scene-memory", {}, refusal(wish, id, trees_.bytes_of(found)).message);
+  const auto answer = residency_.want(id, trees_.need_of(found), now, use_of_);
+  if (answer != SceneResidency::Answer::awaited)
+    throw InputError("--scene-memory", {}, refusal(answer, id, trees_.bytes_of(found)).message);
   residency_.next(now, use_of_);
   auto entry = loads_.load_now(found);
   on_loaded(id, {std::move(entry)}, now, clock_());
@@ -69,15 +69,15 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
   if (!trees_.form_of(book.found)) {
     if (trees_.given_up(book.found))
-      return refusal(SceneResidency::Wish::too_large, id, book.found.size.bytes());
+      return refusal(SceneResidency::Answer::too_large, id, book.found.size.bytes());
     trees_.order(book.found, true);
     return SceneAwaited{trees_.estimate(book.found)};
   }
   const std::uint64_t bytes = trees_.bytes_of(book.found);
-  const auto wish = residency_.want(id, trees_.need_of(book.found), now, use_of_);
-  if (wish != SceneResidency::Wish::awaited) {
+  const auto answer = residency_.want(id, trees_.need_of(book.found), now, use_of_);
+  if (answer != SceneResidency::Answer::awaited) {
     if (redrawing_.holds_two_forms()) return SceneAwaited{1s};  // one of them goes soon
-    return refusal(wish, id, bytes);
+    return refusal(answer, id, bytes);
   }
   if (residency_.visitor_waits() && (residency_.loads_in_background() || posters_.busy()))
     loads_.give_way();

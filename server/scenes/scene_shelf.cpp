@@ -79,13 +79,13 @@ std::vector<std::string> SceneShelf::scene_ids() const {
   return ids;
 }
 
-std::string SceneShelf::resolve(std::string_view wish) const {
-  if (!belongs_to_path(wish)) {
+std::string SceneShelf::resolve(std::string_view name) const {
+  if (!belongs_to_path(name)) {
     const std::lock_guard lock(published_mutex_);
-    if (const auto known = by_name_.find(wish); known != by_name_.end() && !known->second.empty())
+    if (const auto known = by_name_.find(name); known != by_name_.end() && !known->second.empty())
       return known->second;
   }
-  return std::string(wish);
+  return std::string(name);
 }
 
 std::vector<ScenePages> SceneShelf::pages() const {

@@ -92,10 +92,10 @@ class SceneShelf {
   [[nodiscard]] const std::string& preferred() const { return preferred_; }
   [[nodiscard]] std::string default_scene() const;
   [[nodiscard]] std::vector<std::string> scene_ids() const;
-  /// Any thread. Returns the id of the only scene with this name, or else the wish itself. If two
+  /// Any thread. Returns the id of the only scene with this name, or else the name itself. If two
   /// paths have had the name since the start, it stands for neither, because a link by name does
   /// not tell them apart.
-  [[nodiscard]] std::string resolve(std::string_view wish) const;
+  [[nodiscard]] std::string resolve(std::string_view name) const;
 
   /// The pages of trees that are in memory.
   [[nodiscard]] std::vector<ScenePages> pages() const;

@@ -30,8 +30,8 @@ class SceneSource {
   [[nodiscard]] virtual std::vector<std::string> scene_ids() const = 0;
   /// Resolves a name to a scene's id. A name that stands for no scene or for several is returned
   /// unchanged.
-  [[nodiscard]] virtual std::string resolve(std::string_view wish) const {
-    return std::string(wish);
+  [[nodiscard]] virtual std::string resolve(std::string_view name) const {
+    return std::string(name);
   }
   [[nodiscard]] virtual bool has(const std::string& id) const = 0;
   /// Requests a scene for a client that may see it. The scene stays in memory as long as its entry

@@ -30,8 +30,8 @@ class AccessTest : public testing::Test {
     return access.permit(token, now_unix_s, one_hall).refusal(scene_id, use);
   }
   /// Of a server on which one scene alone is called "hall".
-  static std::string one_hall(std::string_view wish) {
-    return wish == "hall" ? "hall-bcdfghjk" : std::string(wish);
+  static std::string one_hall(std::string_view name) {
+    return name == "hall" ? "hall-bcdfghjk" : std::string(name);
   }
   const test::TemporaryFolder folder;
 };

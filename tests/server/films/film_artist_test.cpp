@@ -101,34 +101,34 @@ TEST_F(FilmArtist, SceneIsLetGoWhereItIsNeededElsewhere) {
     return take();
   };
   ResultFile file, undisturbed;
-  const FilmWish wish{FilmKind::picture, {2200, 1100}, {view}};
-  draw_film(wish, take_again, file, [&](double share, Clock::duration) {
+  const FilmRequest wanted{FilmKind::picture, {2200, 1100}, {view}};
+  draw_film(wanted, take_again, file, [&](double share, Clock::duration) {
     ++leases->recalls;
     if (share > 0.851) {
       EXPECT_EQ(leases->held, 0) << "while the file is written";
     }
   });
   EXPECT_EQ(taken, 3) << "each is let go after the part that follows";
-  draw_film(wish, take, undisturbed, [](double, Clock::duration) {});
+  draw_film(wanted, take, undisturbed, [](double, Clock::duration) {});
   EXPECT_EQ(read_png(file.path()).rgb, read_png(undisturbed.path()).rgb);
 }
 
 TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
-  FilmWish wish{FilmKind::film, {64, 48}, {view, view}};
+  FilmRequest wanted{FilmKind::film, {64, 48}, {view, view}};
   for (int i = 0; i < 6; ++i) {
     view.world_from_camera.position.x += 0.1f;
-    wish.views.push_back(view);
+    wanted.views.push_back(view);
   }
   ResultFile file;
   int frames = 0;
-  draw_film(wish, take, file, [&](double, Clock::duration) { ++frames; });
+  draw_film(wanted, take, file, [&](double, Clock::duration) { ++frames; });
   EXPECT_GE(frames, 8);
   std::array<std::byte, 8> head{};
   ASSERT_TRUE(file.read(0, head));
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(head.data()) + 4, 4), "ftyp");
   frames = 0;
   ResultFile other;
-  EXPECT_THROW(draw_film(wish, take, other,
+  EXPECT_THROW(draw_film(wanted, take, other,
                          [&](double, Clock::duration) {
                            if (++frames == 3) throw std::runtime_error("cancelled");
                          }),
