@@ -10,7 +10,7 @@
 #include "server/base/metrics.h"
 #include "server/config/config.h"
 #include "server/counts/visits_page.h"
-#include "server/films/film_studio.h"
+#include "server/films/film_renderer.h"
 #include "server/net/static_files.h"
 #include "server/scenes/media_api.h"
 #include "server/scenes/scene_api.h"
@@ -50,7 +50,7 @@ struct RequestHandlers {
   MediaApi media;
   std::optional<VisitsPage> visits;
   SidecarSaver saver;
-  FilmStudio films;
+  FilmRenderer films;
 
  private:
   /// What killed servers have left where authors save.

@@ -1,4 +1,4 @@
-#include "server/films/film_artist.h"
+#include "server/films/film_worker.h"
 
 #include <algorithm>
 #include <stdexcept>

@@ -22,7 +22,7 @@ namespace catgs {
 /// and hands out the results. A job's id is 128 random bits: whoever knows it may ask for
 /// it, until its order's link is revoked. While visitors look at scenes, at most half of the time
 /// is spent on drawing. A scene whose memory visitors need is let go between two pictures.
-class FilmStudio {
+class FilmRenderer {
  public:
   struct Surroundings {
     boost::asio::io_context& io;  // runs the session thread
@@ -36,7 +36,7 @@ class FilmStudio {
     std::chrono::milliseconds longest_wait = std::chrono::minutes(10);
   };
   /// Its end waits for that of the current part or row.
-  explicit FilmStudio(Surroundings around)
+  explicit FilmRenderer(Surroundings around)
       : around_(std::move(around)), jobs_(around_.background) {}
 
   // Network thread. `id`: of a job.

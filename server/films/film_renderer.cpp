@@ -1,4 +1,4 @@
-#include "server/films/film_studio.h"
+#include "server/films/film_renderer.h"
 
 #include <array>
 #include <span>
@@ -9,7 +9,7 @@
 
 #include "render_core/base/error.h"
 #include "server/base/log_event.h"
-#include "server/films/film_artist.h"
+#include "server/films/film_worker.h"
 
 namespace catgs {
 namespace {
@@ -31,7 +31,7 @@ HttpResponse no_such_job() {
 
 }  // namespace
 
-HttpResponse FilmStudio::result(std::string_view id) {
+HttpResponse FilmRenderer::result(std::string_view id) {
   const auto job = find(id);
   if (job && !has_ended(*job))
     return text_response(
@@ -48,7 +48,7 @@ HttpResponse FilmStudio::result(std::string_view id) {
   return response;
 }
 
-HttpResponse FilmStudio::report(std::string_view id) {
+HttpResponse FilmRenderer::report(std::string_view id) {
   const auto job = find(id);
   if (!job) return no_such_job();
   constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
@@ -60,24 +60,24 @@ HttpResponse FilmStudio::report(std::string_view id) {
   return json_response(200, report);
 }
 
-std::optional<FilmReport> FilmStudio::find(std::string_view id) {
+std::optional<FilmReport> FilmRenderer::find(std::string_view id) {
   auto job = queue_->find(id);
   return job && !around_.ended(job->owner) ? job : std::nullopt;
 }
 
-std::optional<HttpResponse> FilmStudio::refuse_cancel(std::string_view id) {
+std::optional<HttpResponse> FilmRenderer::refuse_cancel(std::string_view id) {
   const auto job = find(id);
   return job && !has_ended(*job) ? std::nullopt : std::optional(no_such_job());
 }
 
-HttpResponse FilmStudio::cancel(std::string_view id) {
+HttpResponse FilmRenderer::cancel(std::string_view id) {
   if (auto refusal = refuse_cancel(id)) return *std::move(refusal);
   return queue_->cancel(id) ? text_response(200, "cancelled\n") : no_such_job();
 }
 
-std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string owner,
-                                            std::string json,
-                                            std::shared_ptr<const UploadPlace> place) {
+std::future<HttpResponse> FilmRenderer::order(std::string scene_id, std::string owner,
+                                              std::string json,
+                                              std::shared_ptr<const UploadPlace> place) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
   // An order is too long to be read on the network thread.
@@ -93,7 +93,7 @@ std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string ow
   return future;
 }
 
-HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std::string& json) {
+HttpResponse FilmRenderer::take(std::string scene_id, std::string owner, const std::string& json) {
   FilmRequest request;
   try {
     request = parse_film_request(json);
@@ -117,12 +117,12 @@ HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std
   return json_response(202, {{"id", id}});
 }
 
-void FilmStudio::check(const FilmJob& job, double share, const std::stop_token& stop) {
+void FilmRenderer::check(const FilmJob& job, double share, const std::stop_token& stop) {
   if (around_.ended(job.owner)) queue_->cancel(job.id);
   if (stop.stop_requested() || !queue_->drawn(job.id, share)) throw Cancelled();
 }
 
-void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
+void FilmRenderer::draw(const FilmJob& job, const std::stop_token& stop) {
   const TimePoint started = Clock::now();
   double done = 0.0;
   std::optional<int> content = job.content;
@@ -149,8 +149,8 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   }
 }
 
-LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::optional<int> content,
-                                   const std::stop_token& stop) {
+LeasedScene FilmRenderer::take_scene(const FilmJob& job, double share, std::optional<int> content,
+                                     const std::stop_token& stop) {
   const TimePoint begun = Clock::now();
   while (true) {
     const LeasedScene scene = ask_session_thread(
