@@ -35,13 +35,13 @@ std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
 /// A quarter of the processors. Trees are built while visitors look.
 int builder_threads(const RendererOptions& core) { return std::max(1, core.pool->threads() / 4); }
 
-GroundSource ground_source_of(const SceneBook& book, const SceneTrees& trees,
+GroundSource ground_source_of(const SceneRecord& record, const SceneTrees& trees,
                               const ServerConfig& config) {
-  GroundSource source = ground_source(book.found.location, book.entry->facts);
+  GroundSource source = ground_source(record.found.location, record.entry->facts);
   if (source.scene.format == nullptr) return source;  // procedural
-  if (trees.ready(book.found)) source.tree = trees.form_of(book.found)->tree;
+  if (trees.ready(record.found)) source.tree = trees.form_of(record.found)->tree;
   source.levels = chosen_levels(config);
-  source.beside = book.entry->sidecar;
+  source.beside = record.entry->sidecar;
   if (!source.beside.empty()) source.beside.replace_extension(".walk");
   return source;
 }
@@ -62,7 +62,7 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core, Bac
       folders_({config.scene_folders.begin(), config.scene_folders.end()}, look_,
                keys_of(config.scenes)),
       loads_(config_, core, look_.ids, trees_, files_.get(), background, io),
-      memory_(config_, shelf_, trees_, loads_, metrics_, clock_),
+      memory_(config_, index_, trees_, loads_, metrics_, clock_),
       grounds_(files_.get(), builder_threads(core), background, io) {
   pin_scenes();
   if (config_.scene_folders.empty())
@@ -84,15 +84,15 @@ void SceneLibrary::pin_scenes() {
     auto entry = loads_.load_now(found);
     const std::string id = entry->facts.scene_id;
     memory_.pin(id, *entry);
-    SceneBook& book = shelf_.book_of(id);
-    book.found = std::move(found);
-    book.found.name = entry->name;
-    if (book.found.size.gaussians == 0) book.found.size.gaussians = entry->facts.gaussians;
-    book.pinned = true;
-    book.entry = std::move(entry);
-    if (shelf_.preferred().empty()) shelf_.prefer(id);
+    SceneRecord& record = index_.record_of(id);
+    record.found = std::move(found);
+    record.found.name = entry->name;
+    if (record.found.size.gaussians == 0) record.found.size.gaussians = entry->facts.gaussians;
+    record.pinned = true;
+    record.entry = std::move(entry);
+    if (index_.preferred().empty()) index_.prefer(id);
     // The banner shows the first scene's renderer.
-    if (const std::string& text = book.entry->renderer_text; text != renderer_text())
+    if (const std::string& text = record.entry->renderer_text; text != renderer_text())
       log_info({.event = "renderer", .scene = id}, "scene {}: renderer {}", id, text);
   }
 }
@@ -105,21 +105,21 @@ void SceneLibrary::open_folders() {
            found.size());
   merge(std::move(found));
   next_scan_ = clock_() + scan_interval;
-  if (!shelf_.preferred().empty()) return;
-  if (shelf_.books().empty())
+  if (!index_.preferred().empty()) return;
+  if (index_.records().empty())
     throw InputError("--scene-folder " + config_.scene_folders.front(), {}, "holds no scene",
                      "put one there, or give --scene");
   // Those that have to wait for their trees are the last choice.
   std::vector<std::string> ids;
-  for (const auto& [id, book] : shelf_.books()) ids.push_back(id);
+  for (const auto& [id, record] : index_.records()) ids.push_back(id);
   std::ranges::stable_partition(ids, [this](const std::string& id) {
-    return trees_.form_of(shelf_.books().at(id).found).has_value();
+    return trees_.form_of(index_.records().at(id).found).has_value();
   });
   std::optional<InputError> first_error;
   for (const std::string& id : ids) {
     try {
       memory_.load_now(id);
-      return shelf_.prefer(id);
+      return index_.prefer(id);
     } catch (const DevicesUnusable&) {
       throw;  // no other scene helps
     } catch (const InputError& error) {
@@ -132,7 +132,7 @@ void SceneLibrary::open_folders() {
 
 void SceneLibrary::on_tick(TimePoint now) {
   memory_.on_tick(now);
-  metrics_.set_pages(shelf_.pages());
+  metrics_.set_pages(index_.pages());
   if (!next_scan_ || now < *next_scan_) return;
   next_scan_.reset();
   loads_.scan(folders_, [this](std::optional<std::vector<FoundScene>> found) {
@@ -147,13 +147,13 @@ void SceneLibrary::want_poster(const std::string& id) {
 
 void SceneLibrary::want_ground(const std::string& id) {
   boost::asio::post(io_, [this, id] {
-    SceneBook* const book = shelf_.find(id);
-    if (!book || !book->entry || book->ground || book->outdated || grounds_.busy()) return;
-    if (book->ground_retry_at && clock_() < *book->ground_retry_at) return;
-    const GroundSource source = ground_source_of(*book, trees_, config_);
+    SceneRecord* const record = index_.find(id);
+    if (!record || !record->entry || record->ground || record->outdated || grounds_.busy()) return;
+    if (record->ground_retry_at && clock_() < *record->ground_retry_at) return;
+    const GroundSource source = ground_source_of(*record, trees_, config_);
     grounds_.find(id, source,
-                  [this, id, source, changed = book->found.changed](const auto& ground) {
-                    SceneBook* const found_for = shelf_.find(id);
+                  [this, id, source, changed = record->found.changed](const auto& ground) {
+                    SceneRecord* const found_for = index_.find(id);
                     if (!found_for || !found_for->entry || found_for->ground ||
                         found_for->found.changed != changed ||
                         !same_ground(source, ground_source_of(*found_for, trees_, config_)))
@@ -166,35 +166,35 @@ void SceneLibrary::want_ground(const std::string& id) {
 }
 
 std::shared_ptr<const SceneEntry> SceneLibrary::in_memory(const std::string& id) const {
-  const auto it = shelf_.books().find(id);
-  return it == shelf_.books().end() ? nullptr : it->second.entry;
+  const auto it = index_.records().find(id);
+  return it == index_.records().end() ? nullptr : it->second.entry;
 }
 
 void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntry> entry) {
-  SceneBook* const book = shelf_.find(id);
-  if (!book || !book->entry) return;
-  if (book->former && book->former->renderer == entry->renderer)
-    entry = redrawn(*entry, *book->entry);
-  if (book->entry->renderer != entry->renderer) return;
-  const GroundSource before = ground_source_of(*book, trees_, config_);
-  book->entry = unleased(std::move(entry), book->entry->renderer);
-  if (!book->outdated && !same_ground(before, ground_source_of(*book, trees_, config_)))
-    book->ground.reset();
+  SceneRecord* const record = index_.find(id);
+  if (!record || !record->entry) return;
+  if (record->former && record->former->renderer == entry->renderer)
+    entry = redrawn(*entry, *record->entry);
+  if (record->entry->renderer != entry->renderer) return;
+  const GroundSource before = ground_source_of(*record, trees_, config_);
+  record->entry = unleased(std::move(entry), record->entry->renderer);
+  if (!record->outdated && !same_ground(before, ground_source_of(*record, trees_, config_)))
+    record->ground.reset();
   memory_.publish();
 }
 
 void SceneLibrary::merge(std::vector<FoundScene> found) {
-  shelf_.merge(std::move(found), [this](const std::string& id) { return memory_.awaited(id); });
+  index_.merge(std::move(found), [this](const std::string& id) { return memory_.awaited(id); });
   std::set<std::string> trees;
-  for (const auto& [id, book] : shelf_.books())
-    if (!book.found.tree.empty()) trees.insert(book.found.tree);
+  for (const auto& [id, record] : index_.records())
+    if (!record.found.tree.empty()) trees.insert(record.found.tree);
   trees_.keep(trees);
   memory_.publish();
 }
 
 /// The renderer that was made first.
 std::string SceneLibrary::renderer_text() const {
-  return shelf_.books().at(shelf_.preferred()).entry->renderer_text;
+  return index_.records().at(index_.preferred()).entry->renderer_text;
 }
 
 }  // namespace catgs

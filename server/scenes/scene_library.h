@@ -14,9 +14,9 @@
 #include "server/config/config.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_grounds.h"
+#include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_memory.h"
-#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_source.h"
 #include "server/scenes/scene_trees.h"
 
@@ -35,14 +35,14 @@ class SceneLibrary final : public SceneSource {
                boost::asio::io_context& io, Metrics& metrics,
                std::function<TimePoint()> clock = Clock::now);
 
-  [[nodiscard]] std::string default_scene() const override { return shelf_.default_scene(); }
-  [[nodiscard]] std::vector<std::string> scene_ids() const override { return shelf_.scene_ids(); }
-  /// Any thread. See SceneShelf.
+  [[nodiscard]] std::string default_scene() const override { return index_.default_scene(); }
+  [[nodiscard]] std::vector<std::string> scene_ids() const override { return index_.scene_ids(); }
+  /// Any thread. See SceneIndex.
   [[nodiscard]] std::string resolve(std::string_view name) const override {
-    return shelf_.resolve(name);
+    return index_.resolve(name);
   }
   [[nodiscard]] bool has(const std::string& id) const override {
-    return shelf_.books().contains(id);
+    return index_.records().contains(id);
   }
   SceneAnswer want(const std::string& id, TimePoint now) override { return memory_.want(id, now); }
   /// Does nothing while a scene is being loaded, or where the scene would not fit beside those in
@@ -69,7 +69,7 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::string renderer_text() const;
   /// Any thread.
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const {
-    return shelf_.listing();
+    return index_.listing();
   }
   /// Any thread. See ScenePosters.
   void want_poster(const std::string& id);
@@ -91,7 +91,7 @@ class SceneLibrary final : public SceneSource {
   const SceneLook look_;
   SceneFolders folders_;  // used by the loader's scans after construction
   SceneLoader loads_;
-  SceneShelf shelf_;
+  SceneIndex index_;
   SceneMemory memory_;
   std::optional<TimePoint> next_scan_;  // nothing without folders, and while a scan runs
   SceneGrounds grounds_;

@@ -26,24 +26,24 @@ ResidencyLimits residency_limits(const ServerConfig& config) {
 
 }  // namespace
 
-SceneMemory::SceneMemory(const ServerConfig& config, SceneShelf& shelf, SceneTrees& trees,
+SceneMemory::SceneMemory(const ServerConfig& config, SceneIndex& index, SceneTrees& trees,
                          SceneLoader& loader, Metrics& metrics, std::function<TimePoint()> clock)
     : config_(config),
-      shelf_(shelf),
+      index_(index),
       trees_(trees),
       loads_(loader),
       metrics_(metrics),
       clock_(std::move(clock)),
       residency_(residency_limits(config)),
       use_of_([this](const std::string& id) {
-        const SceneBook* const book = shelf_.find(id);
-        return book ? book->use() : SceneUse::none;
+        const SceneRecord* const record = index_.find(id);
+        return record ? record->use() : SceneUse::none;
       }),
-      redrawing_(shelf_, trees_, residency_, loads_),
-      posters_(shelf_, trees_, residency_, loads_, [this] { publish(); }) {}
+      redrawing_(index_, trees_, residency_, loads_),
+      posters_(index_, trees_, residency_, loads_, [this] { publish(); }) {}
 
 void SceneMemory::load_now(const std::string& id) {
-  const FoundScene& found = shelf_.books().at(id).found;
+  const FoundScene& found = index_.records().at(id).found;
   const TimePoint now = clock_();
   const auto answer = residency_.want(id, trees_.need_of(found), now, use_of_);
   if (answer != SceneResidency::Answer::awaited)
@@ -59,22 +59,22 @@ void SceneMemory::failed_now(const std::string& id, const std::string& error) {
 
 SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
   std::erase_if(prepared_, [&](const Prepared& prepared) { return prepared.id == id; });
-  const SceneBook& book = shelf_.books().at(id);
-  if (book.entry) {
+  const SceneRecord& record = index_.records().at(id);
+  if (record.entry) {
     residency_.note_use(id, now);
-    return book.entry;
+    return record.entry;
   }
-  if (book.retry_at && now < *book.retry_at)
+  if (record.retry_at && now < *record.retry_at)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
-  if (!trees_.form_of(book.found)) {
-    if (trees_.given_up(book.found))
-      return refusal(SceneResidency::Answer::too_large, id, book.found.size.bytes());
-    trees_.order(book.found, true);
-    return SceneAwaited{trees_.estimate(book.found)};
+  if (!trees_.form_of(record.found)) {
+    if (trees_.given_up(record.found))
+      return refusal(SceneResidency::Answer::too_large, id, record.found.size.bytes());
+    trees_.order(record.found, true);
+    return SceneAwaited{trees_.estimate(record.found)};
   }
-  const std::uint64_t bytes = trees_.bytes_of(book.found);
-  const auto answer = residency_.want(id, trees_.need_of(book.found), now, use_of_);
+  const std::uint64_t bytes = trees_.bytes_of(record.found);
+  const auto answer = residency_.want(id, trees_.need_of(record.found), now, use_of_);
   if (answer != SceneResidency::Answer::awaited) {
     if (redrawing_.holds_two_forms()) return SceneAwaited{1s};  // one of them goes soon
     return refusal(answer, id, bytes);
@@ -87,9 +87,9 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
 }
 
 void SceneMemory::prepare(const std::string& id, TimePoint now) {
-  const SceneBook* const book = shelf_.find(id);
-  if (!book || book->gone || book->entry || residency_.busy() || posters_.busy()) return;
-  if (!trees_.form_of(book->found)) return;
+  const SceneRecord* const record = index_.find(id);
+  if (!record || record->gone || record->entry || residency_.busy() || posters_.busy()) return;
+  if (!trees_.form_of(record->found)) return;
   std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
   if (prepared_.size() >= most_prepared) {
     const auto [oldest, since] = prepared_.front();
@@ -99,19 +99,19 @@ void SceneMemory::prepare(const std::string& id, TimePoint now) {
     release(oldest);
     prepared_.erase(prepared_.begin());
   }
-  if (!residency_.has_room(trees_.need_of(book->found))) return;
+  if (!residency_.has_room(trees_.need_of(record->found))) return;
   if (std::holds_alternative<SceneAwaited>(want(id, now))) prepared_.push_back({id, now});
 }
 
 void SceneMemory::on_tick(TimePoint now) {
   std::vector<std::string> outdated;
-  for (const auto& [id, book] : shelf_.books()) {
-    if (!book.entry || book.pinned) continue;
-    const SceneUse use = book.use();
+  for (const auto& [id, record] : index_.records()) {
+    if (!record.entry || record.pinned) continue;
+    const SceneUse use = record.use();
     if (use != SceneUse::none) residency_.note_use(id, now);
-    if (use == SceneUse::visitors || !(book.outdated || book.gone)) continue;
+    if (use == SceneUse::visitors || !(record.outdated || record.gone)) continue;
     if (use == SceneUse::background)
-      book.recall();
+      record.recall();
     else
       outdated.push_back(id);
   }
@@ -125,14 +125,14 @@ void SceneMemory::on_tick(TimePoint now) {
 void SceneMemory::start_next(TimePoint now) {
   const auto step = residency_.next(now, use_of_);
   if (!step) return;
-  for (const std::string& id : step->recall) shelf_.books().at(id).recall();
+  for (const std::string& id : step->recall) index_.records().at(id).recall();
   if (step->recall.empty()) carry_out(*step, SceneLoader::For::visitors, now);
 }
 
 void SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For whom,
                             TimePoint now) {
   for (const std::string& id : step.release) release(id);
-  const FoundScene& found = shelf_.books().at(step.load).found;
+  const FoundScene& found = index_.records().at(step.load).found;
   const auto form = trees_.form_of(found);
   if (!form) return residency_.failed(step.load);  // its tree was lost; visitors ask again
   loads_.load(found, *form, whom, [this, id = step.load, now](LoadedScene loaded) {
@@ -142,68 +142,69 @@ void SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For w
 
 /// The next scene finds the memory free.
 void SceneMemory::release(const std::string& id) {
-  SceneBook& book = shelf_.books().at(id);
+  SceneRecord& record = index_.records().at(id);
   log_info({.event = "scene_released", .scene = id}, "scene {} released", id);
   metrics_.scenes_released.Increment();
   residency_.drop(id);
-  auto entry = std::exchange(book.entry, nullptr);
-  book.ground.reset();
-  book.outdated = book.tree_lost = false;
-  if (book.gone) shelf_.books().erase(id);
+  auto entry = std::exchange(record.entry, nullptr);
+  record.ground.reset();
+  record.outdated = record.tree_lost = false;
+  if (record.gone) index_.records().erase(id);
   publish();
   loads_.free_later(std::move(entry));
 }
 
 void SceneMemory::on_loaded(const std::string& id, LoadedScene loaded, TimePoint started,
                             TimePoint now) {
-  SceneBook* const book = shelf_.find(id);
-  if (!loaded.entry || !book) {
+  SceneRecord* const record = index_.find(id);
+  if (!loaded.entry || !record) {
     residency_.failed(id);
     if (loaded.gave_way) return start_next(now);
     if (loaded.unusable_tree) {
-      if (book) trees_.discard(book->found, loaded.error);
+      if (record) trees_.discard(record->found, loaded.error);
       return start_next(now);  // visitors ask again
     }
     log_error({.event = "scene_load_failed", .scene = id}, "scene {} is not loaded: {}", id,
               loaded.error);
     metrics_.scene_loads_failed.Increment();
-    if (book) book->retry_at = now + retry_after_failure;
+    if (record) record->retry_at = now + retry_after_failure;
     return start_next(now);
   }
   const SceneNeed need = need_of(*loaded.entry);
   const double seconds = std::chrono::duration<double>(now - started).count();
   if (!loaded.entry->in_pages)
     bytes_per_second_ =
-        std::max(1e6, static_cast<double>(trees_.bytes_of(book->found)) / std::max(seconds, 0.1));
+        std::max(1e6, static_cast<double>(trees_.bytes_of(record->found)) / std::max(seconds, 0.1));
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, need, now);
-  book->entry = std::move(loaded.entry);
-  book->ground.reset();
+  record->entry = std::move(loaded.entry);
+  record->ground.reset();
   publish();
   start_next(now);
 }
 
 LeasedScene SceneMemory::lease(const std::string& id, bool again) {
-  const SceneBook* const book = shelf_.find(id);
-  if (!book) return {.gone = true};
-  const LeasedScene none{.gone = book->gone};
-  if (book->entry) {
+  const SceneRecord* const record = index_.find(id);
+  if (!record) return {.gone = true};
+  const LeasedScene none{.gone = record->gone};
+  if (record->entry) {
     // While a visitor needs the room, no scene is held that visitors have left.
-    const bool leaves = book->outdated || book->gone || residency_.visitor_waits();
-    return leaves && !book->pinned && book->use() != SceneUse::visitors ? none : book->lease();
+    const bool leaves = record->outdated || record->gone || residency_.visitor_waits();
+    return leaves && !record->pinned && record->use() != SceneUse::visitors ? none
+                                                                            : record->lease();
   }
   const TimePoint now = clock_();
-  if (!again || book->gone || posters_.busy() || (book->retry_at && now < *book->retry_at) ||
-      !trees_.form_of(book->found))
+  if (!again || record->gone || posters_.busy() || (record->retry_at && now < *record->retry_at) ||
+      !trees_.form_of(record->found))
     return none;
-  const auto step = residency_.next_in_background(id, trees_.need_of(book->found), now, use_of_);
+  const auto step = residency_.next_in_background(id, trees_.need_of(record->found), now, use_of_);
   if (!step) return none;
   carry_out(*step, SceneLoader::For::jobs, now);
   return none;
 }
 
 void SceneMemory::publish() {
-  shelf_.publish([this](const FoundScene& found) { return trees_.state_of(found); });
+  index_.publish([this](const FoundScene& found) { return trees_.state_of(found); });
   metrics_.scenes_in_memory.Set(static_cast<double>(residency_.count()));
   metrics_.scene_bytes.Set(static_cast<double>(residency_.bytes()));
 }

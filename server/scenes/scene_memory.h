@@ -7,11 +7,11 @@
 
 #include "server/base/metrics.h"
 #include "server/config/config.h"
+#include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_posters.h"
 #include "server/scenes/scene_redrawing.h"
 #include "server/scenes/scene_residency.h"
-#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_source.h"
 #include "server/scenes/scene_trees.h"
 
@@ -22,7 +22,7 @@ namespace catgs {
 class SceneMemory {
  public:
   /// All outlive this object.
-  SceneMemory(const ServerConfig& config, SceneShelf& shelf, SceneTrees& trees, SceneLoader& loader,
+  SceneMemory(const ServerConfig& config, SceneIndex& index, SceneTrees& trees, SceneLoader& loader,
               Metrics& metrics, std::function<TimePoint()> clock);
 
   /// Counts a scene that stays in memory for good.
@@ -54,7 +54,7 @@ class SceneMemory {
   void release(const std::string& id);
 
   const ServerConfig& config_;
-  SceneShelf& shelf_;
+  SceneIndex& index_;
   SceneTrees& trees_;
   SceneLoader& loads_;
   Metrics& metrics_;

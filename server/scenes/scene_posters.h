@@ -3,9 +3,9 @@
 #include <functional>
 #include <string>
 
+#include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_residency.h"
-#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_trees.h"
 
 namespace catgs {
@@ -14,9 +14,9 @@ namespace catgs {
 class ScenePosters {
  public:
   /// `changed` is called when there is a new poster. All outlive this object, and its tasks.
-  ScenePosters(SceneShelf& shelf, SceneTrees& trees, SceneResidency& residency, SceneLoader& loader,
+  ScenePosters(SceneIndex& index, SceneTrees& trees, SceneResidency& residency, SceneLoader& loader,
                std::function<void()> changed)
-      : shelf_(shelf),
+      : index_(index),
         trees_(trees),
         residency_(residency),
         loader_(loader),
@@ -28,9 +28,9 @@ class ScenePosters {
   [[nodiscard]] bool busy() const { return busy_; }
 
  private:
-  void start(SceneBook& book, const SceneForm& form);
+  void start(SceneRecord& record, const SceneForm& form);
 
-  SceneShelf& shelf_;
+  SceneIndex& index_;
   SceneTrees& trees_;
   SceneResidency& residency_;
   SceneLoader& loader_;

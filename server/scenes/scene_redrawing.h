@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "server/base/clock.h"
+#include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_residency.h"
-#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_trees.h"
 
 namespace catgs {
@@ -23,9 +23,9 @@ inline SceneNeed need_of(const SceneEntry& entry) {
 class SceneRedrawing {
  public:
   /// All outlive this object, and its tasks.
-  SceneRedrawing(SceneShelf& shelf, SceneTrees& trees, SceneResidency& residency,
+  SceneRedrawing(SceneIndex& index, SceneTrees& trees, SceneResidency& residency,
                  SceneLoader& loader)
-      : shelf_(shelf), trees_(trees), residency_(residency), loader_(loader) {}
+      : index_(index), trees_(trees), residency_(residency), loader_(loader) {}
 
   struct Tick {
     std::vector<std::string> too_large;  // ids of unused scenes whose two forms do not fit together
@@ -44,7 +44,7 @@ class SceneRedrawing {
   void on_loaded(const std::string& id, const FoundScene& found, LoadedScene loaded,
                  const std::shared_ptr<Renderer>& before);
 
-  SceneShelf& shelf_;
+  SceneIndex& index_;
   SceneTrees& trees_;
   SceneResidency& residency_;
   SceneLoader& loader_;

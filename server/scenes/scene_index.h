@@ -35,7 +35,7 @@ struct SceneListing {
 };
 
 /// What the server knows of a scene that it offers.
-struct SceneBook {
+struct SceneRecord {
   FoundScene found;  // of procedural scenes, only location.given, name and size are set
   std::shared_ptr<const SceneEntry> entry;      // while in memory
   std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
@@ -55,7 +55,7 @@ struct SceneBook {
   /// Scenes come into use on the session thread only, so an unused scene stays unused. Uses may end
   /// elsewhere without harm.
   [[nodiscard]] SceneUse use() const;
-  /// True if only the shelf holds the former entry.
+  /// True if only the index holds the former entry.
   [[nodiscard]] bool former_is_left() const { return former && !held(former, 0); }
   /// A background job's hold on the entry.
   [[nodiscard]] LeasedScene lease() const {
@@ -65,7 +65,7 @@ struct SceneBook {
   void recall() const { ++leases->recalls; }
 
  private:
-  /// True if a user besides the shelf and so many leases holds the scene.
+  /// True if a user besides the index and so many leases holds the scene.
   static bool held(const std::shared_ptr<const SceneEntry>& entry, int leases) {
     return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1 + leases);
   }
@@ -73,17 +73,17 @@ struct SceneBook {
 
 /// The scenes that a server offers, by id and by name, and their listing. All functions run on the
 /// session thread unless marked.
-class SceneShelf {
+class SceneIndex {
  public:
-  using Books = std::map<std::string, SceneBook>;
-  [[nodiscard]] Books& books() { return books_; }
-  [[nodiscard]] const Books& books() const { return books_; }
+  using Records = std::map<std::string, SceneRecord>;
+  [[nodiscard]] Records& records() { return records_; }
+  [[nodiscard]] const Records& records() const { return records_; }
   /// Null: there is none.
-  [[nodiscard]] SceneBook* find(const std::string& id);
-  /// Returns the book with this id and creates it if needed.
-  SceneBook& book_of(const std::string& id);
-  /// Takes over the result of a scan. Books of scenes that are gone are removed, unless they are in
-  /// memory or `awaited`.
+  [[nodiscard]] SceneRecord* find(const std::string& id);
+  /// Returns the record with this id and creates it if needed.
+  SceneRecord& record_of(const std::string& id);
+  /// Takes over the result of a scan. Records of scenes that are gone are removed, unless they are
+  /// in memory or `awaited`.
   void merge(std::vector<FoundScene> found,
              const std::function<bool(const std::string& id)>& awaited);
 
@@ -105,7 +105,7 @@ class SceneShelf {
   [[nodiscard]] std::shared_ptr<const std::vector<SceneListing>> listing() const;
 
  private:
-  Books books_;
+  Records records_;
   std::string preferred_;
   mutable std::mutex published_mutex_;  // guards the next two
   std::shared_ptr<const std::vector<SceneListing>> published_;
