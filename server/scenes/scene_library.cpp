@@ -39,7 +39,7 @@ GroundSource ground_source_of(const SceneRecord& record, const SceneTrees& trees
                               const ServerConfig& config) {
   GroundSource source = ground_source(record.found.location, record.entry->facts);
   if (source.scene.format == nullptr) return source;  // procedural
-  if (trees.ready(record.found)) source.tree = trees.form_of(record.found)->tree;
+  if (trees.ready(record.found)) source.tree = trees.representation_of(record.found)->tree;
   source.levels = chosen_levels(config);
   source.beside = record.entry->sidecar;
   if (!source.beside.empty()) source.beside.replace_extension(".walk");
@@ -58,10 +58,11 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core, Bac
       files_(config.cache_dir.empty() ? nullptr : std::make_unique<DerivedFiles>(config.cache_dir)),
       trees_(config, files_.get(), builder_threads(core), background, io, metrics, clock_,
              [this](std::uint64_t bytes) { return memory_.could_fit(bytes); }),
-      look_{SceneIds(config.scenes, config.scene_folders), chosen_levels(config), trees_.enabled()},
-      folders_({config.scene_folders.begin(), config.scene_folders.end()}, look_,
+      scan_options_{SceneIds(config.scenes, config.scene_folders), chosen_levels(config),
+                    trees_.enabled()},
+      folders_({config.scene_folders.begin(), config.scene_folders.end()}, scan_options_,
                keys_of(config.scenes)),
-      loads_(config_, core, look_.ids, trees_, files_.get(), background, io),
+      loads_(config_, core, scan_options_.ids, trees_, files_.get(), background, io),
       memory_(config_, index_, trees_, loads_, metrics_, clock_),
       grounds_(files_.get(), builder_threads(core), background, io) {
   pin_scenes();
@@ -80,7 +81,8 @@ void SceneLibrary::pin_scenes() {
     if (!keys.insert(scene_key(scene.given.string())).second) continue;  // given twice
     FoundScene found;
     found.location = scene;
-    if (trees_.enabled() && scene.format != nullptr) found = look_at_scene(scene, look_);
+    if (trees_.enabled() && scene.format != nullptr)
+      found = read_scene_headers(scene, scan_options_);
     auto entry = loads_.load_now(found);
     const std::string id = entry->facts.scene_id;
     memory_.pin(id, *entry);
@@ -113,7 +115,7 @@ void SceneLibrary::open_folders() {
   std::vector<std::string> ids;
   for (const auto& [id, record] : index_.records()) ids.push_back(id);
   std::ranges::stable_partition(ids, [this](const std::string& id) {
-    return trees_.form_of(index_.records().at(id).found).has_value();
+    return trees_.representation_of(index_.records().at(id).found).has_value();
   });
   std::optional<InputError> first_error;
   for (const std::string& id : ids) {

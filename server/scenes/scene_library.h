@@ -49,8 +49,9 @@ class SceneLibrary final : public SceneSource {
   /// memory. Two scenes at a time are loaded so and not entered; the older one is released for
   /// another when it has stayed as long as any scene does.
   void prepare(const std::string& id, TimePoint now) override { memory_.prepare(id, now); }
-  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) override {
-    return memory_.newer_form(seen);
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& seen) override {
+    return memory_.newer_representation(seen);
   }
   void on_tick(TimePoint now) override;
 
@@ -88,7 +89,7 @@ class SceneLibrary final : public SceneSource {
   const std::function<TimePoint()> clock_;
   const std::unique_ptr<DerivedFiles> files_;  // null: no --cache-dir
   SceneTrees trees_;
-  const SceneLook look_;
+  const SceneScanOptions scan_options_;
   SceneFolders folders_;  // used by the loader's scans after construction
   SceneLoader loads_;
   SceneIndex index_;

@@ -60,31 +60,33 @@ void SceneLoader::keep_core() {
 
 std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found) {
   const std::string spec = found.location.given.string();
-  const auto load_as = [&](const SceneForm& form) {
+  const auto load_as = [&](const SceneRepresentation& representation) {
     return load_scene(
-        found.location, form, [&](const auto& name) { return ids_.id_of(spec, name); }, config_,
-        core_, core_.pool->threads());
+        found.location, representation, [&](const auto& name) { return ids_.id_of(spec, name); },
+        config_, core_, core_.pool->threads());
   };
   try {
-    if (trees_.ready(found)) return load_as(*trees_.form_of(found));
+    if (trees_.ready(found)) return load_as(*trees_.representation_of(found));
   } catch (const UnusableTree& error) {
     trees_.discard(found, error.what());
   }
   try {
-    if (!trees_.form_of(found)) trees_.build_now(found);
+    if (!trees_.representation_of(found)) trees_.build_now(found);
   } catch (const InputError& error) {
     trees_.give_up(found, error.what());
     throw;  // as a whole it does not fit
   }
-  return load_as(trees_.form_of(found).value_or(SceneForm()));
+  return load_as(trees_.representation_of(found).value_or(SceneRepresentation()));
 }
 
-void SceneLoader::load(const FoundScene& found, const SceneForm& form, For whom,
+void SceneLoader::load(const FoundScene& found, const SceneRepresentation& representation, For whom,
                        std::function<void(LoadedScene)> then) {
   const bool waits = whom == For::visitors;
   const auto id = jobs_.start_then(
       lanes::scenes, waits ? Priority::high : Priority::normal,
-      [this, found, form](const auto& stop) { return load_on(found, form, stop); },
+      [this, found, representation](const auto& stop) {
+        return load_on(found, representation, stop);
+      },
       [then = std::move(then)](Finished<LoadedScene> loaded) {
         then(loaded.result ? *std::move(loaded.result)
                            : LoadedScene{.entry = nullptr, .gave_way = true});
@@ -92,14 +94,14 @@ void SceneLoader::load(const FoundScene& found, const SceneForm& form, For whom,
   if (!waits) gives_way_ = id;
 }
 
-LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneForm& form,
+LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneRepresentation& representation,
                                  const std::stop_token& stop) const {
   try {
     // Half of the processors stay free for the visitors' frames.
     const int threads = std::max(1, core_.pool->threads() / 2);
     return {load_scene(
-        found.location, form, [&](const auto&) { return found.id; }, config_, core_, threads,
-        [&](double) { throw_if_stopped(stop); })};
+        found.location, representation, [&](const auto&) { return found.id; }, config_, core_,
+        threads, [&](double) { throw_if_stopped(stop); })};
   } catch (const UnusableTree& error) {
     return {nullptr, error.what(), true};
   } catch (const std::exception& error) {
@@ -107,23 +109,26 @@ LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneForm& form,
   }
 }
 
-void SceneLoader::load_poster(const FoundScene& found, const SceneForm& form,
+void SceneLoader::load_poster(const FoundScene& found, const SceneRepresentation& representation,
                               std::function<void(std::optional<Poster>)> then) {
   gives_way_ = jobs_.start_then(
       lanes::scenes, Priority::normal,
-      [this, found, form](const auto& stop) { return poster_of(found, form, stop); },
+      [this, found, representation](const auto& stop) {
+        return poster_of(found, representation, stop);
+      },
       [then = std::move(then)](Finished<Poster> made) {
         then(made.error.empty() ? std::move(made.result) : Poster());
       });
 }
 
 /// The scene goes here, in the background: that may wait for the device.
-SceneLoader::Poster SceneLoader::poster_of(const FoundScene& found, const SceneForm& form,
+SceneLoader::Poster SceneLoader::poster_of(const FoundScene& found,
+                                           const SceneRepresentation& representation,
                                            const std::stop_token& stop) const {
   const std::string name = files_ ? poster_name(found.location, chosen_levels(config_)) : "";
   if (auto kept = files_ ? files_->read(name, most_poster_bytes, check_jpeg) : std::nullopt)
     return std::make_shared<const std::string>(*std::move(kept));
-  const LoadedScene loaded = load_on(found, form, stop);
+  const LoadedScene loaded = load_on(found, representation, stop);
   const Poster poster = loaded.entry ? loaded.entry->poster : nullptr;
   if (files_ && poster) files_->write(name, *poster);
   return poster;

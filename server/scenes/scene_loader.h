@@ -32,11 +32,11 @@ class SceneLoader {
   using Poster = std::shared_ptr<const std::string>;  // a JPEG file; null: none
   /// Takes the scene's poster from the cache, or loads the scene for a moment to make it. No
   /// visitor waits for it. Nothing: it gave way.
-  void load_poster(const FoundScene& found, const SceneForm& form,
+  void load_poster(const FoundScene& found, const SceneRepresentation& representation,
                    std::function<void(std::optional<Poster>)> then);
   /// Loads it in the background and calls `then`. Visitors' loads come first.
   enum class For { visitors, jobs };
-  void load(const FoundScene& found, const SceneForm& form, For whom,
+  void load(const FoundScene& found, const SceneRepresentation& representation, For whom,
             std::function<void(LoadedScene)> then);
   /// Ends a load that no visitor waits for.
   void give_way() { jobs_.cancel(gives_way_); }
@@ -47,9 +47,10 @@ class SceneLoader {
             std::function<void(std::optional<std::vector<FoundScene>>)> then);
 
  private:
-  [[nodiscard]] LoadedScene load_on(const FoundScene& found, const SceneForm& form,
+  [[nodiscard]] LoadedScene load_on(const FoundScene& found,
+                                    const SceneRepresentation& representation,
                                     const std::stop_token& stop) const;
-  [[nodiscard]] Poster poster_of(const FoundScene& found, const SceneForm& form,
+  [[nodiscard]] Poster poster_of(const FoundScene& found, const SceneRepresentation& representation,
                                  const std::stop_token& stop) const;
 
   const ServerConfig& config_;

@@ -67,7 +67,7 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
   if (record.retry_at && now < *record.retry_at)
     return ErrorMessage{ErrorCode::unknown_scene,
                         fmt::format("the scene \"{}\" could not be loaded", name_in(id)), false};
-  if (!trees_.form_of(record.found)) {
+  if (!trees_.representation_of(record.found)) {
     if (trees_.given_up(record.found))
       return refusal(SceneResidency::Answer::too_large, id, record.found.size.bytes());
     trees_.order(record.found, true);
@@ -76,7 +76,7 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
   const std::uint64_t bytes = trees_.bytes_of(record.found);
   const auto answer = residency_.want(id, trees_.need_of(record.found), now, use_of_);
   if (answer != SceneResidency::Answer::awaited) {
-    if (redrawing_.holds_two_forms()) return SceneAwaited{1s};  // one of them goes soon
+    if (redrawing_.holds_two_representations()) return SceneAwaited{1s};  // one of them goes soon
     return refusal(answer, id, bytes);
   }
   if (residency_.visitor_waits() && (residency_.loads_in_background() || posters_.busy()))
@@ -89,7 +89,7 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
 void SceneMemory::prepare(const std::string& id, TimePoint now) {
   const SceneRecord* const record = index_.find(id);
   if (!record || record->gone || record->entry || residency_.busy() || posters_.busy()) return;
-  if (!trees_.form_of(record->found)) return;
+  if (!trees_.representation_of(record->found)) return;
   std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
   if (prepared_.size() >= most_prepared) {
     const auto [oldest, since] = prepared_.front();
@@ -133,9 +133,10 @@ void SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For w
                             TimePoint now) {
   for (const std::string& id : step.release) release(id);
   const FoundScene& found = index_.records().at(step.load).found;
-  const auto form = trees_.form_of(found);
-  if (!form) return residency_.failed(step.load);  // its tree was lost; visitors ask again
-  loads_.load(found, *form, whom, [this, id = step.load, now](LoadedScene loaded) {
+  const auto representation = trees_.representation_of(found);
+  if (!representation)
+    return residency_.failed(step.load);  // its tree was lost; visitors ask again
+  loads_.load(found, *representation, whom, [this, id = step.load, now](LoadedScene loaded) {
     on_loaded(id, std::move(loaded), now, clock_());
   });
 }
@@ -195,7 +196,7 @@ LeasedScene SceneMemory::lease(const std::string& id, bool again) {
   }
   const TimePoint now = clock_();
   if (!again || record->gone || posters_.busy() || (record->retry_at && now < *record->retry_at) ||
-      !trees_.form_of(record->found))
+      !trees_.representation_of(record->found))
     return none;
   const auto step = residency_.next_in_background(id, trees_.need_of(record->found), now, use_of_);
   if (!step) return none;

@@ -37,8 +37,9 @@ class SceneMemory {
   void prepare(const std::string& id, TimePoint now);
   [[nodiscard]] LeasedScene lease(const std::string& id, bool again);
   void want_poster(const std::string& id) { posters_.want(id); }
-  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) const {
-    return redrawing_.newer_form(seen);
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& seen) const {
+    return redrawing_.newer_representation(seen);
   }
   void on_tick(TimePoint now);
 

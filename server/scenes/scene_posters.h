@@ -28,7 +28,7 @@ class ScenePosters {
   [[nodiscard]] bool busy() const { return busy_; }
 
  private:
-  void start(SceneRecord& record, const SceneForm& form);
+  void start(SceneRecord& record, const SceneRepresentation& representation);
 
   SceneIndex& index_;
   SceneTrees& trees_;

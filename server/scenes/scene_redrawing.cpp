@@ -17,14 +17,15 @@ bool reads_damaged_tree(const SceneRecord& record) {
 
 }  // namespace
 
-std::shared_ptr<const SceneEntry> SceneRedrawing::newer_form(const SceneEntry& seen) const {
+std::shared_ptr<const SceneEntry> SceneRedrawing::newer_representation(
+    const SceneEntry& seen) const {
   const auto record = index_.records().find(seen.facts.scene_id);
   if (record == index_.records().end()) return nullptr;
   const auto& former = record->second.former;
   return former && former->renderer == seen.renderer ? record->second.entry : nullptr;
 }
 
-bool SceneRedrawing::holds_two_forms() const {
+bool SceneRedrawing::holds_two_representations() const {
   return busy_ || std::ranges::any_of(index_.records(),
                                       [](const auto& of) { return of.second.former != nullptr; });
 }
@@ -38,7 +39,7 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
       changed_ = true;
     }
     const FoundScene& found = record.found;
-    // Where visitors still see the form before, another one waits.
+    // Where visitors still see the representation before, another one waits.
     if (!record.entry || record.former || record.outdated || record.gone) continue;
     if (!record.tree_lost && reads_damaged_tree(record)) {
       trees_.discard(found, "pages are damaged");
@@ -65,7 +66,7 @@ void SceneRedrawing::start(const std::string& id) {
   busy_ = true;
   const SceneRecord& record = *index_.find(id);
   residency_.resize(id, need_of(*record.entry).with(trees_.need_of(record.found)));
-  loader_.load(record.found, *trees_.form_of(record.found), SceneLoader::For::visitors,
+  loader_.load(record.found, *trees_.representation_of(record.found), SceneLoader::For::visitors,
                [this, id, found = record.found, before = record.entry->renderer](
                    LoadedScene loaded) { on_loaded(id, found, std::move(loaded), before); });
 }
@@ -83,7 +84,7 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   residency_.resize(id, need_of(*record->entry).with(need_of(*loaded.entry)));
   record->former = std::exchange(record->entry, redrawn(*record->entry, *loaded.entry));
   record->tree_lost = false;
-  record->recall();  // jobs go on with the new form
+  record->recall();  // jobs go on with the new representation
   changed_ = true;
   log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
            id);

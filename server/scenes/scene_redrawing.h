@@ -28,16 +28,18 @@ class SceneRedrawing {
       : index_(index), trees_(trees), residency_(residency), loader_(loader) {}
 
   struct Tick {
-    std::vector<std::string> too_large;  // ids of unused scenes whose two forms do not fit together
-    bool changed = false;                // the listing has
+    std::vector<std::string>
+        too_large;         // ids of unused scenes whose two representations do not fit together
+    bool changed = false;  // the listing has
   };
   Tick on_tick(TimePoint now);
 
-  /// True while a scene takes the memory of two forms. One of them goes soon.
-  [[nodiscard]] bool holds_two_forms() const;
+  /// True while a scene takes the memory of two representations. One of them goes soon.
+  [[nodiscard]] bool holds_two_representations() const;
 
   /// See SceneSource.
-  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) const;
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& seen) const;
 
  private:
   void start(const std::string& id);

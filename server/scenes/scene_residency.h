@@ -26,7 +26,7 @@ struct SceneNeed {
   SceneNeed(std::uint64_t of_bytes, bool is_in_pages = false)  // NOLINT: bytes are a need
       : bytes(is_in_pages ? 0 : of_bytes), in_pages(is_in_pages) {}
 
-  /// That of two forms of one scene.
+  /// That of two representations of one scene.
   [[nodiscard]] SceneNeed with(const SceneNeed& other) const {
     SceneNeed both = *this;
     both.bytes += other.bytes;

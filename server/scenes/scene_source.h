@@ -39,9 +39,10 @@ class SceneSource {
   virtual SceneAnswer want(const std::string& id, TimePoint now) = 0;
   /// Somebody may want the scene soon. It is loaded where that costs nobody another scene.
   virtual void prepare(const std::string& /*id*/, TimePoint /*now*/) {}
-  /// The entry that replaces one that a visitor sees, of the same scene in another form; null: it
-  /// stays.
-  [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& /*seen*/) {
+  /// The entry that replaces one that a visitor sees, of the same scene in another representation;
+  /// null: it stays.
+  [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& /*seen*/) {
     return nullptr;
   }
   /// Call it at least four times a second.

@@ -52,15 +52,16 @@ bool SceneTrees::needs_one(const FoundScene& scene) const {
   return !scene.tree.empty() && !could_fit_(scene.size.bytes());
 }
 
-std::optional<SceneForm> SceneTrees::form_of(const FoundScene& scene) const {
-  SceneForm form;
+std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScene& scene) const {
+  SceneRepresentation representation;
   if (ready(scene)) {
-    form.tree = cache_->path_of(scene.tree);
+    representation.tree = cache_->path_of(scene.tree);
   } else if (needs_one(scene)) {
     if (!scene.location.has_levels()) return std::nullopt;
-    form.most_gaussians = tree_memory(config_) / GaussianCloud::bytes(1, scene.size.sh_degree);
+    representation.most_gaussians =
+        tree_memory(config_) / GaussianCloud::bytes(1, scene.size.sh_degree);
   }
-  return form;
+  return representation;
 }
 
 SceneSize SceneTrees::size_of(const FoundScene& scene) const {

@@ -37,9 +37,11 @@ class SceneTrees {
   [[nodiscard]] bool ready(const FoundScene& scene) const;
   /// True if a scene that fits into memory is still better drawn from a tree.
   [[nodiscard]] bool deserves_one(const FoundScene& scene) const;
-  /// The form in which the scene can be loaded now; nothing: its tree has to be built first.
-  [[nodiscard]] std::optional<SceneForm> form_of(const FoundScene& scene) const;
-  /// The most memory that the scene takes on each device in that form, or as a tree, bytes.
+  /// The representation in which the scene can be loaded now; nothing: its tree has to be built
+  /// first.
+  [[nodiscard]] std::optional<SceneRepresentation> representation_of(const FoundScene& scene) const;
+  /// The most memory that the scene takes on each device in that representation, or as a tree,
+  /// bytes.
   [[nodiscard]] std::uint64_t bytes_of(const FoundScene& scene) const;
   /// The same, as the residency counts it.
   [[nodiscard]] SceneNeed need_of(const FoundScene& scene) const;
@@ -81,7 +83,7 @@ class SceneTrees {
   [[nodiscard]] SharedBuild running() const;
   /// True if the scene can be in memory as a tree alone.
   [[nodiscard]] bool needs_one(const FoundScene& scene) const;
-  /// The size of the scene in the form that it has or will have.
+  /// The size of the scene in the representation that it has or will have.
   [[nodiscard]] SceneSize size_of(const FoundScene& scene) const;
   /// Builds on this thread. Throws InputError.
   void build(const FoundScene& scene, const std::function<void(double)>& progress) const;

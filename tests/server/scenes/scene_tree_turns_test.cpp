@@ -35,7 +35,7 @@ TEST_F(SceneTreesTest, SceneInTwoFormsKeepsNobodyOut) {
   config_.gaussians_of_a_tree = 20'000;
   start();
   Entry seen = load("b");
-  run_until([&] { return library_->newer_form(*seen) != nullptr; });
+  run_until([&] { return library_->newer_representation(*seen) != nullptr; });
   EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("c"), now_)))
       << "the form before goes as soon as its visitor has the new one";
   seen.reset();

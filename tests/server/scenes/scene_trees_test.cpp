@@ -22,7 +22,7 @@ TEST_F(SceneTreesTest, ASceneIsServedAtOnceAndThenFromItsTree) {
   start();
   Entry seen = load("a");
   EXPECT_FALSE(seen->in_pages);
-  EXPECT_EQ(library_->newer_form(*seen), nullptr);
+  EXPECT_EQ(library_->newer_representation(*seen), nullptr);
   library_->on_tick(now_);
   EXPECT_THAT(state("a"), HasSubstr("tree")) << "it waits or is built";
   run_until([&] { return in_memory("a") != seen; });
@@ -31,8 +31,8 @@ TEST_F(SceneTreesTest, ASceneIsServedAtOnceAndThenFromItsTree) {
   EXPECT_EQ(tree->facts.gaussians, 3000u);
   EXPECT_EQ(tree->facts.start_pose.position, seen->facts.start_pose.position);
   EXPECT_EQ(tree->facts.title, seen->facts.title);
-  EXPECT_EQ(library_->newer_form(*seen), tree) << "present visitors go on with it";
-  EXPECT_EQ(library_->newer_form(*tree), nullptr);
+  EXPECT_EQ(library_->newer_representation(*seen), tree) << "present visitors go on with it";
+  EXPECT_EQ(library_->newer_representation(*tree), nullptr);
   EXPECT_THAT(trees(), SizeIs(1));
   EXPECT_EQ(state("a"), "");
   EXPECT_EQ(built(), 1);
@@ -133,7 +133,8 @@ TEST_F(SceneTreesTest, DamageThatIsFoundLaterIsMended) {
   run_until([&] { return in_memory("b") != seen; });
   EXPECT_EQ(built(), 2);
   EXPECT_EQ(bytes_in(tree), bytes);
-  EXPECT_EQ(library_->newer_form(*seen), in_memory("b")) << "present visitors go on with it";
+  EXPECT_EQ(library_->newer_representation(*seen), in_memory("b"))
+      << "present visitors go on with it";
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
   EXPECT_THAT(trees(), ElementsAre(tree)) << "the new one is not that with the damage";
 }
@@ -225,7 +226,7 @@ TEST_F(SceneTreesTest, OneOfTheSettingsIsReadyWhenTheServerIs) {
   const Entry whole = in_memory("hall");
   EXPECT_FALSE(whole->in_pages);
   run_until([&] { return in_memory("hall")->in_pages; });
-  EXPECT_EQ(library_->newer_form(*whole), in_memory("hall"));
+  EXPECT_EQ(library_->newer_representation(*whole), in_memory("hall"));
 }
 
 /// Levels of 30,000 and 1,000 Gaussians, of which the finest one takes 7.1 MB.
@@ -249,8 +250,8 @@ TEST_F(SceneTreesTest, AStreamedSceneThatDoesNotFitBeginsWithACoarserLevel) {
   const Entry coarse = load("streamed");
   EXPECT_EQ(coarse->facts.gaussians, 1'000u);
   EXPECT_FALSE(coarse->in_pages);
-  run_until([&] { return library_->newer_form(*coarse) != nullptr; });
-  const Entry tree = library_->newer_form(*coarse);
+  run_until([&] { return library_->newer_representation(*coarse) != nullptr; });
+  const Entry tree = library_->newer_representation(*coarse);
   EXPECT_EQ(tree->facts.gaussians, 30'000u);
   EXPECT_TRUE(tree->in_pages);
 }
