@@ -43,8 +43,8 @@ void SceneIndex::merge(std::vector<FoundScene> found,
       ++record.content;
       record.poster.reset();
       record.poster_tried = false;
-      // Visitors still see the former scene, and no file tells its ground any more.
-      record.ground = record.entry ? std::make_shared<const SceneGround>() : nullptr;
+      // Visitors still see the former scene, and no file tells its walkable area any more.
+      record.walkable_area = record.entry ? std::make_shared<const WalkableArea>() : nullptr;
       record.retry_at.reset();
     }
     record.found = std::move(scene);
@@ -113,7 +113,7 @@ void SceneIndex::publish(const std::function<std::string(const FoundScene&)>& st
                         .loaded = record.entry != nullptr,
                         .state = state_of(found),
                         .poster = record.poster});
-    listing->back().ground = record.ground;
+    listing->back().walkable_area = record.walkable_area;
     if (!record.entry) continue;
     listing->back().tours = record.entry->tours;
     listing->back().sidecar = record.entry->sidecar;

@@ -15,8 +15,8 @@
 #include "server/base/page_metrics.h"
 #include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
-#include "server/scenes/scene_grounds.h"
 #include "server/scenes/scene_lease.h"
+#include "server/scenes/walkable_areas.h"
 
 namespace catgs {
 
@@ -31,7 +31,7 @@ struct SceneListing {
   std::optional<ToursAnswers> tours{};          // of a loaded one
   std::filesystem::path sidecar{};              // of a loaded one; empty: it is no file
   std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
-  std::shared_ptr<const SceneGround> ground{};  // of a loaded one; null: not known yet
+  std::shared_ptr<const WalkableArea> walkable_area{};  // of a loaded one; null: not known yet
 };
 
 /// What the server knows of a scene that it offers.
@@ -41,8 +41,8 @@ struct SceneRecord {
   std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
   std::shared_ptr<const std::string> poster{};  // stays when the entry goes
   bool poster_tried = false;                    // for this content of the file
-  std::shared_ptr<const SceneGround> ground{};  // of the entry; null: not known yet
-  std::optional<TimePoint> ground_retry_at{};   // after a failure to find it
+  std::shared_ptr<const WalkableArea> walkable_area{};  // of the entry; null: not known yet
+  std::optional<TimePoint> walkable_area_retry_at{};    // after a failure to find it
   bool pinned = false;
   bool outdated = false;                // the file has changed since
   bool tree_lost = false;               // the entry reads a tree with damage: another is built

@@ -15,7 +15,7 @@
 #include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
 #include "server/base/scene_id.h"
-#include "server/scenes/ground_of_scene.h"
+#include "server/scenes/compute_walkable_area.h"
 #include "server/scenes/scene_catalog.h"
 
 namespace catgs {
@@ -24,7 +24,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto scan_interval = 30s;
-constexpr auto seek_ground_again_after = 5min;
+constexpr auto seek_again_after = 5min;
 
 std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
   std::set<std::string> keys;
@@ -35,9 +35,9 @@ std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
 /// A quarter of the processors. Trees are built while visitors look.
 int builder_threads(const RendererOptions& core) { return std::max(1, core.pool->threads() / 4); }
 
-GroundSource ground_source_of(const SceneRecord& record, const SceneTrees& trees,
-                              const ServerConfig& config) {
-  GroundSource source = ground_source(record.found.location, record.entry->facts);
+WalkableAreaSource source_of(const SceneRecord& record, const SceneTrees& trees,
+                             const ServerConfig& config) {
+  WalkableAreaSource source = walkable_area_source(record.found.location, record.entry->facts);
   if (source.scene.format == nullptr) return source;  // procedural
   if (trees.ready(record.found)) source.tree = trees.representation_of(record.found)->tree;
   source.levels = chosen_levels(config);
@@ -64,7 +64,7 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core, Bac
                keys_of(config.scenes)),
       loads_(config_, core, scan_options_.ids, trees_, files_.get(), background, io),
       memory_(config_, index_, trees_, loads_, metrics_, clock_),
-      grounds_(files_.get(), builder_threads(core), background, io) {
+      walkable_areas_(files_.get(), builder_threads(core), background, io) {
   pin_scenes();
   if (config_.scene_folders.empty())
     merge({});
@@ -147,23 +147,25 @@ void SceneLibrary::want_poster(const std::string& id) {
   boost::asio::post(io_, [this, id] { memory_.want_poster(id); });
 }
 
-void SceneLibrary::want_ground(const std::string& id) {
+void SceneLibrary::want_walkable_area(const std::string& id) {
   boost::asio::post(io_, [this, id] {
     SceneRecord* const record = index_.find(id);
-    if (!record || !record->entry || record->ground || record->outdated || grounds_.busy()) return;
-    if (record->ground_retry_at && clock_() < *record->ground_retry_at) return;
-    const GroundSource source = ground_source_of(*record, trees_, config_);
-    grounds_.find(id, source,
-                  [this, id, source, changed = record->found.changed](const auto& ground) {
-                    SceneRecord* const found_for = index_.find(id);
-                    if (!found_for || !found_for->entry || found_for->ground ||
-                        found_for->found.changed != changed ||
-                        !same_ground(source, ground_source_of(*found_for, trees_, config_)))
-                      return;
-                    found_for->ground = ground;
-                    if (!ground) found_for->ground_retry_at = clock_() + seek_ground_again_after;
-                    memory_.publish();
-                  });
+    if (!record || !record->entry || record->walkable_area || record->outdated ||
+        walkable_areas_.busy())
+      return;
+    if (record->walkable_area_retry_at && clock_() < *record->walkable_area_retry_at) return;
+    const WalkableAreaSource source = source_of(*record, trees_, config_);
+    walkable_areas_.find(
+        id, source, [this, id, source, changed = record->found.changed](const auto& walkable_area) {
+          SceneRecord* const found_for = index_.find(id);
+          if (!found_for || !found_for->entry || found_for->walkable_area ||
+              found_for->found.changed != changed ||
+              !same_walkable_area(source, source_of(*found_for, trees_, config_)))
+            return;
+          found_for->walkable_area = walkable_area;
+          if (!walkable_area) found_for->walkable_area_retry_at = clock_() + seek_again_after;
+          memory_.publish();
+        });
   });
 }
 
@@ -178,10 +180,10 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
   if (record->former && record->former->renderer == entry->renderer)
     entry = redrawn(*entry, *record->entry);
   if (record->entry->renderer != entry->renderer) return;
-  const GroundSource before = ground_source_of(*record, trees_, config_);
+  const WalkableAreaSource before = source_of(*record, trees_, config_);
   record->entry = unleased(std::move(entry), record->entry->renderer);
-  if (!record->outdated && !same_ground(before, ground_source_of(*record, trees_, config_)))
-    record->ground.reset();
+  if (!record->outdated && !same_walkable_area(before, source_of(*record, trees_, config_)))
+    record->walkable_area.reset();
   memory_.publish();
 }
 

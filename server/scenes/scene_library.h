@@ -13,12 +13,12 @@
 #include "server/base/metrics.h"
 #include "server/config/config.h"
 #include "server/scenes/scene_folder.h"
-#include "server/scenes/scene_grounds.h"
 #include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_memory.h"
 #include "server/scenes/scene_source.h"
 #include "server/scenes/scene_trees.h"
+#include "server/scenes/walkable_areas.h"
 
 namespace catgs {
 
@@ -76,7 +76,7 @@ class SceneLibrary final : public SceneSource {
   void want_poster(const std::string& id);
   /// Any thread. Finds where people can walk in a scene in memory, one scene at a time. Does
   /// nothing where that is known or under way.
-  void want_ground(const std::string& id);
+  void want_walkable_area(const std::string& id);
 
  private:
   void pin_scenes();
@@ -95,7 +95,7 @@ class SceneLibrary final : public SceneSource {
   SceneIndex index_;
   SceneMemory memory_;
   std::optional<TimePoint> next_scan_;  // nothing without folders, and while a scan runs
-  SceneGrounds grounds_;
+  WalkableAreas walkable_areas_;
 };
 
 }  // namespace catgs

@@ -148,7 +148,7 @@ void SceneMemory::release(const std::string& id) {
   metrics_.scenes_released.Increment();
   residency_.drop(id);
   auto entry = std::exchange(record.entry, nullptr);
-  record.ground.reset();
+  record.walkable_area.reset();
   record.outdated = record.tree_lost = false;
   if (record.gone) index_.records().erase(id);
   publish();
@@ -179,7 +179,7 @@ void SceneMemory::on_loaded(const std::string& id, LoadedScene loaded, TimePoint
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, need, now);
   record->entry = std::move(loaded.entry);
-  record->ground.reset();
+  record->walkable_area.reset();
   publish();
   start_next(now);
 }
