@@ -157,8 +157,10 @@ TEST_F(SidecarSaverTest, WhatTheAuthorSaysIsShownAtOnce) {
 TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
   Saved begun = save(sidecar_at(1));
   Saved waits = save(sidecar_at(2));
-  io_.restart();
-  while (io_.poll_one() == 0) std::this_thread::yield();  // until the first save has its scene
+  while (io_.poll_one() == 0) {  // until the first save has its scene
+    io_.restart();
+    std::this_thread::yield();
+  }
   saver_->stop();
   ASSERT_TRUE(is_ready(waits));
   const HttpResponse refused = waits.get();
