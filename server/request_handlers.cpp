@@ -17,15 +17,16 @@ StaticFiles find_client(const std::string& client_dir) {
 RequestHandlers::RequestHandlers(Parts around)
     : parts(std::move(around)),
       scenes(parts.scenes, parts.authorize),
-      media({parts.scenes,
+      media({parts.scenes, parts.background,
              [this](std::string_view token_id) { return parts.access.ended(token_id); },
              parts.access.own_key(), unix_now_s}),
-      saver(parts.scenes, parts.io, parts.config.media_origins),
-      films({parts.io, [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
+      saver(parts.scenes, parts.background, parts.io, parts.config.media_origins),
+      films({parts.io, parts.background,
+             [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
              [this] { return parts.places.anybody_looks(); },
              [this](std::string_view token_id) { return parts.access.ended(token_id); }}) {
-  if (parts.book)
-    visits.emplace(*parts.book, unix_now_s, [this](const std::string& scene_id) {
+  if (parts.statistics)
+    visits.emplace(*parts.statistics, unix_now_s, [this](const std::string& scene_id) {
       const auto listing = parts.scenes.listing();
       const auto scene = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
       return scene != listing->end() && scene->tours ? scene->tours->titles : nullptr;

@@ -10,7 +10,7 @@
 #include "server/base/metrics.h"
 #include "server/config/config.h"
 #include "server/counts/visits_page.h"
-#include "server/films/film_studio.h"
+#include "server/films/film_renderer.h"
 #include "server/net/static_files.h"
 #include "server/scenes/media_api.h"
 #include "server/scenes/scene_api.h"
@@ -30,6 +30,7 @@ struct RequestHandlers {
   /// All outlive the handlers.
   struct Parts {
     boost::asio::io_context& io;  // runs the session thread
+    Background& background;
     const ServerConfig& config;
     SceneLibrary& scenes;
     AccessControl& access;
@@ -40,7 +41,7 @@ struct RequestHandlers {
     const std::atomic<bool>& ready;
     Metrics& metrics;
     const StaticFiles& client;
-    const VisitBook* book;  // null: visits are not counted
+    const UsageStatistics* statistics;  // null: visits are not counted
   };
   explicit RequestHandlers(Parts around);
 
@@ -49,7 +50,7 @@ struct RequestHandlers {
   MediaApi media;
   std::optional<VisitsPage> visits;
   SidecarSaver saver;
-  FilmStudio films;
+  FilmRenderer films;
 
  private:
   /// What killed servers have left where authors save.

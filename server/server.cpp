@@ -19,7 +19,7 @@
 #include "server/base/metrics.h"
 #include "server/base/prompt_thread.h"
 #include "server/base/watchdog.h"
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 #include "server/frame_path.h"
 #include "server/graceful_stop.h"
 #include "server/net/net_server.h"
@@ -64,8 +64,9 @@ struct Server::State {
                read_own_key(config.resume_key_file, config.token_key_file)),
         client(find_client(config.client_dir)),
         net(net_options()),
-        pool(std::make_shared<ThreadPool>(config.threads)),
-        devices(std::make_shared<DeviceSet>(config.devices)) {}
+        core{.kind = config.renderer,
+             .pool = std::make_shared<ThreadPool>(config.threads),
+             .devices = std::make_shared<DeviceSet>(config.devices)} {}
 
   NetOptions net_options();
   void print_banner() const;
@@ -76,12 +77,12 @@ struct Server::State {
   Metrics metrics;
   const StaticFiles client;
   std::atomic<bool> ready{false};
+  const std::shared_ptr<Background> background = std::make_shared<Background>();
   NetServer net;
-  boost::asio::io_context io{1};  // outlives the pool, whose tasks post to it
-  std::shared_ptr<ThreadPool> pool;
-  std::shared_ptr<DeviceSet> devices;  // all scenes' Views are counted in one
+  boost::asio::io_context io{1};  // outlives the pool of the core, whose tasks post to it
+  RendererOptions core;           // all scenes' Views are counted in one set of devices
   std::optional<VisitCounts> counts;
-  std::optional<VisitBook> book;
+  std::optional<UsageStatistics> statistics;
   std::unique_ptr<SceneLibrary> scenes;
   std::vector<EncoderChoice> encoders;
   std::unique_ptr<FramePath> frames;
@@ -93,6 +94,7 @@ struct Server::State {
 
 NetOptions Server::State::net_options() {
   NetOptions options;
+  options.background = background;
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return router->respond(request); };
   options.serves_delete = [this](std::string_view path) { return router->serves_delete(path); };
@@ -138,36 +140,35 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   State& s = *state_;
   if (s.config.visit_counts != "off") {
     s.counts.emplace(unix_now_s);
-    s.book.emplace(s.config.visit_counts == "memory" ? "" : s.config.visit_counts, *s.counts);
+    s.statistics.emplace(s.config.visit_counts == "memory" ? "" : s.config.visit_counts, *s.counts,
+                         *s.background);
   }
-  s.scenes = std::make_unique<SceneLibrary>(
-      s.config, RendererOptions{.kind = s.config.renderer, .pool = s.pool, .devices = s.devices},
-      s.io, s.metrics);
+  s.scenes = std::make_unique<SceneLibrary>(s.config, s.core, *s.background, s.io, s.metrics);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
-    const auto resolve = [&s](auto wish) { return s.scenes->resolve(wish); };
+    const auto resolve = [&s](auto name) { return s.scenes->resolve(name); };
     return s.access.permit(token, unix_now_s(), resolve);
   };
   VisitOptions options = visit_options(s.config);
-  PoolExecutor::Pools pools{s.pool};
-  for (const auto& [device, views] : s.devices->views())
+  PoolExecutor::Pools pools{s.core.pool};
+  for (const auto& [device, views] : s.core.devices->views())
     pools.render.emplace(device, std::make_shared<ThreadPool>(render_threads_per_gpu));
-  options.cpus = s.pool->threads();
+  options.cpus = s.core.pool->threads();
   options.on_tick = [&s] { s.liveness.session_moved(); };
   std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
   if (parts.wrap) executor = parts.wrap(std::move(executor));
   executor = std::make_shared<WatchedExecutor>(std::move(executor), s.liveness);
   s.frames = std::make_unique<FramePath>(
-      s.io, executor, static_cast<int>(s.devices->views().size()),
+      s.io, executor, static_cast<int>(s.core.devices->views().size()),
       [&s](const auto& why) { s.graceful_stop.give_up("no device renders any more: " + why); },
       s.metrics);
   s.places = std::make_unique<Places>(
-      VisitContext{s.io, options, executor, *s.devices, *s.frames, *s.scenes, s.encoders, authorize,
-                   SessionTokens(s.access.own_key()), s.metrics, s.counts ? &*s.counts : nullptr,
-                   [&s] { return s.access.revoked_links(); }});
-  s.handlers.emplace(RequestHandlers::Parts{s.io, s.config, *s.scenes, s.access, authorize,
-                                            *s.places, *s.devices, s.liveness, s.ready, s.metrics,
-                                            s.client, s.book ? &*s.book : nullptr});
+      VisitContext{s.io, options, executor, *s.core.devices, *s.frames, *s.scenes, s.encoders,
+                   authorize, SessionTokens(s.access.own_key()), s.metrics,
+                   s.counts ? &*s.counts : nullptr, [&s] { return s.access.revoked_links(); }});
+  s.handlers.emplace(RequestHandlers::Parts{
+      s.io, *s.background, s.config, *s.scenes, s.access, authorize, *s.places, *s.core.devices,
+      s.liveness, s.ready, s.metrics, s.client, s.statistics ? &*s.statistics : nullptr});
   s.router.emplace(public_routes(), *s.handlers);
   s.admin_router.emplace(admin_routes(), *s.handlers);
 }

@@ -53,6 +53,6 @@ using RevokedLinks = std::shared_ptr<const LinkIds>;
 inline constexpr std::string_view link_revoked = "this link was revoked: ask for a new one";
 
 /// Returns the id of a link's scene. The link may contain the scene's name instead.
-using ResolveScene = std::function<std::string(std::string_view wish)>;
+using ResolveScene = std::function<std::string(std::string_view name)>;
 
 }  // namespace catgs

@@ -42,12 +42,12 @@ std::string_view name_in(std::string_view id) {
   return belongs_to_path(id) ? id.substr(0, id.size() - digest_letters - 1) : id;
 }
 
-std::string no_such_scene(std::string_view wish) {
-  if (belongs_to_path(wish))
+std::string no_such_scene(std::string_view name) {
+  if (belongs_to_path(name))
     return fmt::format(
-        "there is no scene \"{}\" here: its file was moved or removed; ask for a new link", wish);
+        "there is no scene \"{}\" here: its file was moved or removed; ask for a new link", name);
   return fmt::format(
-      "there is no scene \"{}\" here, or there are several of this name: ask for a new link", wish);
+      "there is no scene \"{}\" here, or there are several of this name: ask for a new link", name);
 }
 
 }  // namespace catgs

@@ -28,6 +28,6 @@ inline constexpr std::size_t max_scene_id_bytes = 128;
 [[nodiscard]] std::string_view name_in(std::string_view id);
 
 /// The error message for a scene that does not exist here.
-[[nodiscard]] std::string no_such_scene(std::string_view wish);
+[[nodiscard]] std::string no_such_scene(std::string_view name);
 
 }  // namespace catgs

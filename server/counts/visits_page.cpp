@@ -97,8 +97,8 @@ class DayByDay {
     std::function<std::string(const std::string& date, const DayCounts& day)> of_day;
     std::function<std::string()> end = [] { return std::string(); };
   };
-  DayByDay(const VisitBook& book, Parts parts)
-      : book_(book), parts_(std::move(parts)), text_(parts_.head) {}
+  DayByDay(const UsageStatistics& statistics, Parts parts)
+      : statistics_(statistics), parts_(std::move(parts)), text_(parts_.head) {}
 
   /// See HttpResponse::next_piece.
   std::optional<std::string> next() {
@@ -113,14 +113,15 @@ class DayByDay {
   bool read_more() {
     if (!dates_) dates_ = parts_.dates();
     if (days_ > dates_->size()) return false;
-    text_ = days_ < dates_->size() ? parts_.of_day((*dates_)[days_], book_.day((*dates_)[days_]))
-                                   : parts_.end();
+    text_ = days_ < dates_->size()
+                ? parts_.of_day((*dates_)[days_], statistics_.day((*dates_)[days_]))
+                : parts_.end();
     ++days_;
     sent_ = 0;
     return true;
   }
 
-  const VisitBook& book_;
+  const UsageStatistics& statistics_;
   const Parts parts_;
   std::optional<std::vector<std::string>> dates_;
   std::size_t days_ = 0;  // that were read, and one for the end
@@ -236,36 +237,39 @@ DayByDay::Parts summary_parts(const HttpRequest& request, std::int64_t unix_s,
   return parts;
 }
 
-HttpResponse day_by_day(const VisitBook& book, DayByDay::Parts parts, std::string content_type) {
+HttpResponse day_by_day(const UsageStatistics& statistics, DayByDay::Parts parts,
+                        std::string content_type) {
   HttpResponse response;
   response.content_type = std::move(content_type);
-  response.next_piece = [document = std::make_shared<DayByDay>(book, std::move(parts))] {
+  response.next_piece = [document = std::make_shared<DayByDay>(statistics, std::move(parts))] {
     return document->next();
   };
   return response;
 }
 
 /// Of all days that were kept.
-HttpResponse csv(const VisitBook& book, std::string head,
+HttpResponse csv(const UsageStatistics& statistics, std::string head,
                  std::function<std::string(const std::string& date, const DayCounts& day)> of_day) {
-  return day_by_day(book, {std::move(head), [&book] { return book.dates(); }, std::move(of_day)},
-                    "text/csv; charset=utf-8");
+  return day_by_day(
+      statistics,
+      {std::move(head), [&statistics] { return statistics.dates(); }, std::move(of_day)},
+      "text/csv; charset=utf-8");
 }
 
 }  // namespace
 
 HttpResponse VisitsPage::charts(const HttpRequest& request) const {
-  return day_by_day(book_, summary_parts(request, unix_s_(), titles_of_), "application/json");
+  return day_by_day(statistics_, summary_parts(request, unix_s_(), titles_of_), "application/json");
 }
 
 HttpResponse VisitsPage::visits_csv() const {
-  return csv(book_,
+  return csv(statistics_,
              fmt::format("date,scene,visits,seconds,bytes,{}\r\n", fmt::join(device_names, ",")),
              counts_rows);
 }
 
 HttpResponse VisitsPage::stops_csv() const {
-  return csv(book_, "date,scene,tour,stop,tour title,stop title,visits\r\n",
+  return csv(statistics_, "date,scene,tour,stop,tour title,stop title,visits\r\n",
              [titles_of = titles_of_](const std::string& date, const DayCounts& day) {
                return stops_rows(date, day, titles_of);
              });

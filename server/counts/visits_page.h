@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "render_core/scene/files/tour_titles.h"
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 #include "server/net/http.h"
 
 namespace catgs {
@@ -22,8 +22,9 @@ class VisitsPage {
   using TitlesOf = std::function<Titles(const std::string& scene_id)>;
 
   /// All outlive the page and its answers.
-  VisitsPage(const VisitBook& book, std::function<std::int64_t()> unix_s, TitlesOf titles_of)
-      : book_(book), unix_s_(std::move(unix_s)), titles_of_(std::move(titles_of)) {}
+  VisitsPage(const UsageStatistics& statistics, std::function<std::int64_t()> unix_s,
+             TitlesOf titles_of)
+      : statistics_(statistics), unix_s_(std::move(unix_s)), titles_of_(std::move(titles_of)) {}
 
   /// The document that charts.html shows. The query may have `scene`, an id, and `days`.
   [[nodiscard]] HttpResponse charts(const HttpRequest& request) const;
@@ -31,7 +32,7 @@ class VisitsPage {
   [[nodiscard]] HttpResponse stops_csv() const;
 
  private:
-  const VisitBook& book_;
+  const UsageStatistics& statistics_;
   const std::function<std::int64_t()> unix_s_;
   const TitlesOf titles_of_;
 };

@@ -41,7 +41,8 @@ bool has_ended(const FilmReport& job) {
 }
 
 std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_id,
-                                                             std::string owner, FilmWish wish) {
+                                                             std::string owner,
+                                                             FilmRequest request) {
   std::vector<FilmJob> old;
   const std::lock_guard lock(mutex_);
   old = drop_old();
@@ -51,8 +52,8 @@ std::variant<std::string, FilmQueue::Refused> FilmQueue::add(std::string scene_i
   if (std::ranges::count(jobs_, FilmState::waiting, &FilmJob::state) >=
       static_cast<std::ptrdiff_t>(most_waiting))
     return Refused{false};
-  const FilmReport report{.kind = wish.kind, .owner = std::move(owner), .changed = clock_()};
-  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(wish)});
+  const FilmReport report{.kind = request.kind, .owner = std::move(owner), .changed = clock_()};
+  jobs_.push_back({report, random_id(), std::move(scene_id), std::move(request)});
   return jobs_.back().id;
 }
 
@@ -67,9 +68,9 @@ std::optional<FilmJob> FilmQueue::start_next() {
   if (next == jobs_.end()) return std::nullopt;
   next->state = FilmState::drawing;
   next->changed = clock_();
-  std::vector<FilmView> views = std::move(next->wish.views);  // whoever draws has them alone
+  std::vector<FilmView> views = std::move(next->request.views);  // whoever draws has them alone
   FilmJob started = *next;
-  started.wish.views = std::move(views);
+  started.request.views = std::move(views);
   return started;
 }
 
@@ -130,7 +131,7 @@ FilmJob* FilmQueue::known(std::string_view id) {
 
 void FilmQueue::end(FilmJob& job, FilmState state) {
   job.state = state;
-  std::vector<FilmView>().swap(job.wish.views);
+  std::vector<FilmView>().swap(job.request.views);
   job.changed = clock_();
 }
 

@@ -13,7 +13,7 @@
 
 #include "server/base/clock.h"
 #include "server/base/result_file.h"
-#include "server/films/film_wish.h"
+#include "server/films/film_request.h"
 
 namespace catgs {
 
@@ -36,7 +36,7 @@ bool has_ended(const FilmReport& job);
 struct FilmJob : FilmReport {
   std::string id;  // whoever knows it may ask for the result
   std::string scene_id;
-  FilmWish wish;
+  FilmRequest request;
   std::optional<int> content{};  // of the scene, if it was in memory: SceneLease::content()
 };
 
@@ -57,7 +57,8 @@ class FilmQueue {
     bool has_one;  // its owner has a job that has not ended; else too many wait
   };
   /// Returns the id of the job.
-  std::variant<std::string, Refused> add(std::string scene_id, std::string owner, FilmWish wish);
+  std::variant<std::string, Refused> add(std::string scene_id, std::string owner,
+                                         FilmRequest request);
   /// The scene of a job that waits is in memory, so the job may wait for it when its turn comes.
   void found_scene(const std::string& id, int content);
   /// The job to be drawn now; nothing: none waits.

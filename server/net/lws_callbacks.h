@@ -11,7 +11,7 @@
 #include "server/base/rate_limit.h"
 #include "server/net/accept_gate.h"
 #include "server/net/answered_connections.h"
-#include "server/net/disk_threads.h"
+#include "server/net/disk_jobs.h"
 #include "server/net/lws_websocket.h"
 #include "server/net/upload_places.h"
 
@@ -22,7 +22,8 @@ constexpr double idle_round_burst = 3'000.0;
 
 /// The state that callbacks need besides their site. The context's user pointer points to it.
 struct Service {
-  explicit Service(const AcceptGate::Bounds& bounds) : gate(bounds) {}
+  Service(const AcceptGate::Bounds& bounds, Background& background)
+      : gate(bounds), disk(background, waker) {}
 
   std::shared_ptr<LwsWaker> waker = std::make_shared<LwsWaker>();
   std::vector<std::byte> scratch;  // outgoing bytes of the packet being written
@@ -35,7 +36,7 @@ struct Service {
                         Clock::now()};  // rounds without a callback
   UploadPlaces uploads{UploadPlaces::small};
   UploadPlaces large_uploads{UploadPlaces::large};
-  DiskThreads disk{waker};
+  DiskJobs disk;
 };
 
 /// Call it between rounds of the service loop. libwebsockets 4.1.6 accepts connections for as long

@@ -12,7 +12,7 @@
 
 #include "server/net/answered_connections.h"
 #include "server/net/body_deadline.h"
-#include "server/net/disk_threads.h"
+#include "server/net/disk_jobs.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
 
@@ -23,7 +23,7 @@ namespace catgs {
 class LwsHttpExchange {
  public:
   /// The connection is added to `served` when its answer begins. Both outlive the exchange.
-  LwsHttpExchange(AnsweredConnections& served, DiskThreads& disk) : served_(served), disk_(disk) {}
+  LwsHttpExchange(AnsweredConnections& served, DiskJobs& disk) : served_(served), disk_(disk) {}
   ~LwsHttpExchange();  // the connection is closed
   LwsHttpExchange(const LwsHttpExchange&) = delete;
   LwsHttpExchange& operator=(const LwsHttpExchange&) = delete;
@@ -72,7 +72,7 @@ class LwsHttpExchange {
   int write(lws* wsi, std::string_view bytes, std::vector<std::byte>& scratch);
 
   AnsweredConnections& served_;
-  DiskThreads& disk_;
+  DiskJobs& disk_;
   const std::shared_ptr<Waiter> waiter_ = std::make_shared<Waiter>();
   HttpResponse response_;
   bool head_only_ = false;

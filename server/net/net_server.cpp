@@ -77,9 +77,11 @@ Names names_of(const Endpoint& endpoint, bool asks_for_tokens) {
 }  // namespace
 
 struct NetServer::State {
-  explicit State(int sessions_of_an_address)
-      : service(AcceptGate::bounds_for(sessions_of_an_address)) {}
+  explicit State(const NetOptions& options)
+      : background(options.background),
+        service(AcceptGate::bounds_for(options.sessions_of_an_address), *background) {}
 
+  const std::shared_ptr<Background> background;
   Site site;
   Site admin_site;
   Service service;
@@ -128,8 +130,7 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   return lws_get_vhost_listen_port(made);
 }
 
-NetServer::NetServer(NetOptions options)
-    : state_(std::make_unique<State>(options.sessions_of_an_address)) {
+NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>(options)) {
   // A write to a closed peer is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
   lws_set_log_level(log_levels, log_errors);
@@ -220,7 +221,7 @@ void NetServer::stop() {
     lws_context_destroy(s.context);
   }
   s.context = nullptr;
-  s.service.disk.join();  // answers may need what outlives this object no more
+  s.service.disk.end();  // answers may need what outlives this object no more
 }
 
 int NetServer::port() const { return state_->port; }

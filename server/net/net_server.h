@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "server/base/background.h"
 #include "server/base/log_event.h"
 #include "server/net/connection.h"
 #include "server/net/http.h"
@@ -21,6 +22,7 @@ struct Endpoint {
 };
 
 struct NetOptions {
+  std::shared_ptr<Background> background = std::make_shared<Background>();  // reads files
   Endpoint listen;
   HttpHandler http;     // pages and /api of the public port
   HttpUploads uploads;  // to the public port

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -185,14 +184,15 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::
              scene_id, name, bytes.size());
     return text_response(200, "saved\n");
   };
-  boost::asio::post(
-      writer_, [write, answer, content = std::move(content), place = std::move(place)]() mutable {
-        HttpResponse response = busy_response("503: the connection is closed\n");
-        if (!place->abandoned()) response = write(content, *place);
-        std::string().swap(content);  // the place is free before the answer comes
-        place.reset();
-        answer->set_value(std::move(response));
-      });
+  jobs_.start(lanes::media, Priority::normal,
+              [write, answer, content = std::move(content),
+               place = std::move(place)](const std::stop_token&) mutable {
+                HttpResponse response = busy_response("503: the connection is closed\n");
+                if (!place->abandoned()) response = write(content, *place);
+                std::string().swap(content);  // the place is free before the answer comes
+                place.reset();
+                answer->set_value(std::move(response));
+              });
   return future;
 }
 

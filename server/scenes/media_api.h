@@ -9,9 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include <boost/asio/thread_pool.hpp>
-
 #include "server/access/authorize.h"
+#include "server/base/background.h"
 #include "server/media/media_folder.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
@@ -20,19 +19,17 @@
 namespace catgs {
 
 /// Answers requests for the media of scenes, whose senders may see or change them (routes.h).
-/// Network thread; files are read on the disk's threads and written on one of its own.
+/// Network thread; files are read and written in the background.
 class MediaApi {
  public:
   struct Parts {
     const SceneLibrary& scenes;
+    Background& background;
     Ended ended;
     std::string key;  // of passes; servers of a fleet share it
     std::function<std::int64_t()> now_unix_s;
   };
-  explicit MediaApi(Parts parts) : parts_(std::move(parts)) {}
-  ~MediaApi() { writer_.join(); }
-  MediaApi(const MediaApi&) = delete;
-  MediaApi& operator=(const MediaApi&) = delete;
+  explicit MediaApi(Parts parts) : parts_(std::move(parts)), jobs_(parts_.background) {}
 
   /// True if the address has a pass to the scene's media: "?pass=PASS". Elements of a page cannot
   /// send a token.
@@ -56,7 +53,7 @@ class MediaApi {
   [[nodiscard]] std::optional<MediaFolder> folder_of(std::string_view scene_id) const;
 
   const Parts parts_;
-  boost::asio::thread_pool writer_{1};
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

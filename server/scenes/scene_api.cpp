@@ -105,38 +105,39 @@ HttpResponse SceneApi::poster(std::string_view scene_id) {
 }
 
 HttpResponse SceneApi::walkable_area(std::string_view scene_id, std::string_view if_none_match) {
-  return about(scene_id,
-               [&](const SceneLibrary::Listing& scene) { return ground_of(scene, if_none_match); });
+  return about(scene_id, [&](const SceneLibrary::Listing& scene) {
+    return walkable_area_of(scene, if_none_match);
+  });
 }
 
-/// Neither an unfinished search nor a scene without ground is an error, which browsers would
-/// report to visitors who look at the console.
-HttpResponse SceneApi::ground_of(const SceneLibrary::Listing& scene,
-                                 std::string_view if_none_match) {
+/// Neither an unfinished search nor a scene without walkable area is an error, which browsers
+/// would report to visitors who look at the console.
+HttpResponse SceneApi::walkable_area_of(const SceneLibrary::Listing& scene,
+                                        std::string_view if_none_match) {
   constexpr int retry_after_s = 3;
   HttpResponse response;
-  if (!scene.ground && !scene.loaded) {
+  if (!scene.walkable_area && !scene.loaded) {
     response = text_response(404, "404: the scene is not loaded yet\n");
     response.retry_after_s = retry_after_s;
     return response;
   }
-  if (!scene.ground) {
-    scenes_.want_ground(scene.id);
+  if (!scene.walkable_area) {
+    scenes_.want_walkable_area(scene.id);
     response = text_response(202, "202: the walkable area is being computed\n");
     response.retry_after_s = retry_after_s;
     return response;
   }
-  if (!scene.ground->file) {
+  if (!scene.walkable_area->file) {
     response.status = 204;
     return response;
   }
   response.content_type = "application/octet-stream";
   response.cache_control = "private, no-cache";  // kept, and asked for again by its tag
-  response.etag = scene.ground->etag;
+  response.etag = scene.walkable_area->etag;
   if (if_none_match == response.etag)
     response.status = 304;
   else
-    response.body = scene.ground->file;
+    response.body = scene.walkable_area->file;
   return response;
 }
 

@@ -29,7 +29,7 @@ class SceneApi {
   std::string preview(const HttpRequest& request);
 
  private:
-  HttpResponse ground_of(const SceneLibrary::Listing& scene, std::string_view if_none_match);
+  HttpResponse walkable_area_of(const SceneLibrary::Listing& scene, std::string_view if_none_match);
   /// Returns what `answer` makes of a scene of the listing, or status 404.
   template <typename Answer>
   HttpResponse about(std::string_view scene_id, const Answer& answer);

@@ -85,17 +85,17 @@ SceneInPages open_cached(const std::filesystem::path& path, const SceneLocation&
 }
 
 /// A scene in memory; or, with a tree, its outline.
-SceneInPages load(const SceneLocation& location, const SceneForm& form, const ServerConfig& config,
-                  LoadOptions options) {
+SceneInPages load(const SceneLocation& location, const SceneRepresentation& representation,
+                  const ServerConfig& config, LoadOptions options) {
   if (location.format == nullptr) return {nullptr, synthesize(location.given.string())};
-  if (!form.tree.empty()) return open_cached(form.tree, location, options);
+  if (!representation.tree.empty()) return open_cached(representation.tree, location, options);
   if (location.has_levels()) {
     const LoadOptions levels = chosen_levels(config);
     options.lod = levels.lod;
     options.gaussian_budget = levels.gaussian_budget;
-    if (form.most_gaussians > 0) {
+    if (representation.most_gaussians > 0) {
       options.lod.reset();
-      options.gaussian_budget = form.most_gaussians;
+      options.gaussian_budget = representation.most_gaussians;
     }
   }
   if (location.is_in_pages()) return open_in_pages(location, options);
@@ -146,26 +146,27 @@ std::vector<SceneLocation> locate_scenes(const ServerConfig& config) {
 }
 
 std::shared_ptr<const SceneEntry> load_scene(
-    const SceneLocation& location, const SceneForm& form,
+    const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress) {
   const std::string spec = location.given.string();
-  if (form.tree.empty())
+  if (representation.tree.empty())
     log_info({.event = "scene_loading"}, "loading {}", spec);
   else
-    log_info({.event = "scene_loading"}, "loading {} from its tree {}", spec, form.tree.string());
+    log_info({.event = "scene_loading"}, "loading {} from its tree {}", spec,
+             representation.tree.string());
   LoadOptions options;
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
-  auto [tree, scene] = load(location, form, config, std::move(options));
+  auto [tree, scene] = load(location, representation, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
   entry->facts.gaussians = tree ? tree->header().gaussians : scene.cloud.size();
   entry->facts.model = scene.cloud.model;
   entry->in_pages = tree != nullptr;
-  entry->coarse = form.most_gaussians > 0;
+  entry->coarse = representation.most_gaussians > 0;
   use_hints(scene.hints, scene.name, entry->facts);
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);

@@ -35,8 +35,8 @@ std::vector<SceneLocation> locate_scenes(const ServerConfig& config);
 void synthesize_parts(const std::string& spec, ThreadPool& pool,
                       const std::function<void(const GaussianCloud&)>& take);
 
-/// The form in which a scene comes into memory.
-struct SceneForm {
+/// The representation in which a scene comes into memory.
+struct SceneRepresentation {
   std::filesystem::path tree{};    // of a cache, to be read instead of the scene
   std::size_t most_gaussians = 0;  // its finest levels that fit, if it has levels; 0: as configured
 };
@@ -54,11 +54,11 @@ struct LoadedScene {
   bool gave_way = false;       // no error: a visitor's load came first
 };
 
-/// Loads one scene in a form and builds its renderer with the options and pool of `core`. `id_of`
-/// makes the id from the name. `threads` threads read the file. `progress` is called repeatedly and
-/// may throw to cancel. Throws InputError or UnusableTree.
+/// Loads one scene in a representation and builds its renderer with the options and pool of `core`.
+/// `id_of` makes the id from the name. `threads` threads read the file. `progress` is called
+/// repeatedly and may throw to cancel. Throws InputError or UnusableTree.
 std::shared_ptr<const SceneEntry> load_scene(
-    const SceneLocation& location, const SceneForm& form,
+    const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress = {});
 

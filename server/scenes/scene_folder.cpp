@@ -11,7 +11,7 @@
 #include "render_core/scene/formats/json_field.h"
 #include "server/base/log_event.h"
 #include "server/media/media_folder.h"
-#include "server/scenes/tree_cache.h"
+#include "server/scenes/derived_files.h"
 
 namespace catgs {
 namespace {
@@ -50,15 +50,15 @@ fs::file_time_type time_of(const fs::path& path, const std::vector<fs::path>& be
 
 }  // namespace
 
-FoundScene look_at_scene(const SceneLocation& location, const SceneLook& look) {
+FoundScene read_scene_headers(const SceneLocation& location, const SceneScanOptions& options) {
   FoundScene found;
   found.location = location;
   found.name = printable(to_utf8(location.name));
-  found.id = look.ids.id_of(location.given.string(), found.name);
-  const LoadOptions levels = location.has_levels() ? look.levels : LoadOptions();
+  found.id = options.ids.id_of(location.given.string(), found.name);
+  const LoadOptions levels = location.has_levels() ? options.levels : LoadOptions();
   found.size = read_scene_size(location, levels);
   found.about = about_in(location.hints.sidecar);
-  if (look.names_trees && !found.size.in_pages) found.tree = tree_name(location, levels);
+  if (options.names_trees && !found.size.in_pages) found.tree = tree_name(location, levels);
   return found;
 }
 
@@ -103,7 +103,7 @@ std::vector<FoundScene> SceneFolders::scan() {
       now.beside = files_beside(path);
       now.changed = time_of(path, now.beside);
       try {
-        now.scene = look_at_scene(locate_scene(path), look_);
+        now.scene = read_scene_headers(locate_scene(path), scan_options_);
         now.scene.changed = now.changed;
         now.good = true;
       } catch (

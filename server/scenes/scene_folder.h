@@ -27,23 +27,25 @@ struct FoundScene {
 };
 
 /// What is read of scenes that are found.
-struct SceneLook {
+struct SceneScanOptions {
   SceneIds ids;
   LoadOptions levels;  // see read_scene_size()
   bool names_trees = false;
 };
 
 /// Reads the headers of a scene; `changed` is left to the caller. Throws InputError.
-FoundScene look_at_scene(const SceneLocation& location, const SceneLook& look);
+FoundScene read_scene_headers(const SceneLocation& location, const SceneScanOptions& options);
 
 /// Scans folders for scenes repeatedly. Only headers of new and changed scenes are read, because a
 /// folder may be a slow mount of an object store. Not thread-safe.
 class SceneFolders {
  public:
   /// `elsewhere`: scene_key() of scenes that are offered anyway.
-  SceneFolders(std::vector<std::filesystem::path> folders, SceneLook look,
+  SceneFolders(std::vector<std::filesystem::path> folders, SceneScanOptions options,
                std::set<std::string> elsewhere = {})
-      : folders_(std::move(folders)), look_(std::move(look)), elsewhere_(std::move(elsewhere)) {}
+      : folders_(std::move(folders)),
+        scan_options_(std::move(options)),
+        elsewhere_(std::move(elsewhere)) {}
 
   /// Lists the present scenes in order of path: scene files, SOG folders and training output
   /// folders directly in the folders. At most max_scenes are listed; a warning names further ones.
@@ -64,7 +66,7 @@ class SceneFolders {
   std::vector<std::filesystem::path> list() const;
 
   const std::vector<std::filesystem::path> folders_;
-  const SceneLook look_;
+  const SceneScanOptions scan_options_;
   const std::set<std::string> elsewhere_;
   std::map<std::filesystem::path, Known> known_;
   bool told_of_too_many_ = false;

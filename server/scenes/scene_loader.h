@@ -1,43 +1,65 @@
 #pragma once
 
-#include <atomic>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "render_core/frame/renderer.h"
+#include "server/base/background.h"
 #include "server/config/config.h"
+#include "server/scenes/derived_files.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_trees.h"
 
 namespace catgs {
 
-/// Loads scenes as the configuration says, with the server's renderer options.
+/// Loads scenes as the configuration says, with the server's renderer options. Session thread only.
 class SceneLoader {
  public:
   /// All outlive this object.
   SceneLoader(const ServerConfig& config, RendererOptions core, const SceneIds& ids,
-              SceneTrees& trees);
+              SceneTrees& trees, const DerivedFiles* files, Background& background,
+              boost::asio::io_context& io);
 
   /// Loads a scene on this thread, before the server runs. Throws InputError.
   std::shared_ptr<const SceneEntry> load_now(const FoundScene& found);
   /// The first scenes decide whether the server uses GPUs. Call it when they are loaded.
   void keep_core();
 
-  /// Any thread. `gives_way`: no visitor waits for it, and it ends when one waits for another load.
-  LoadedScene load(const FoundScene& found, const SceneForm& form, bool gives_way) const;
-  /// Any thread. Ends a load that gives way.
-  void give_way() { give_way_ = true; }
-  /// Call it before a load that gives way.
-  void begin_in_background() { give_way_ = false; }
-  /// Any thread. Ends all loads.
-  void stop() { stopping_ = true; }
+  using Poster = std::shared_ptr<const std::string>;  // a JPEG file; null: none
+  /// Takes the scene's poster from the cache, or loads the scene for a moment to make it. No
+  /// visitor waits for it. Nothing: it gave way.
+  void load_poster(const FoundScene& found, const SceneRepresentation& representation,
+                   std::function<void(std::optional<Poster>)> then);
+  /// Loads it in the background and calls `then`. Visitors' loads come first.
+  enum class For { visitors, jobs };
+  void load(const FoundScene& found, const SceneRepresentation& representation, For whom,
+            std::function<void(LoadedScene)> then);
+  /// Ends a load that no visitor waits for.
+  void give_way() { jobs_.cancel(gives_way_); }
+  /// Frees a scene in the background, because that may wait for the device.
+  void free_later(std::shared_ptr<const SceneEntry> entry);
+  /// Looks for scenes in the background. Nothing: a folder cannot be read.
+  void scan(SceneFolders& folders,
+            std::function<void(std::optional<std::vector<FoundScene>>)> then);
 
  private:
+  [[nodiscard]] LoadedScene load_on(const FoundScene& found,
+                                    const SceneRepresentation& representation,
+                                    const std::stop_token& stop) const;
+  [[nodiscard]] Poster poster_of(const FoundScene& found, const SceneRepresentation& representation,
+                                 const std::stop_token& stop) const;
+
   const ServerConfig& config_;
   RendererOptions core_;  // fixed once the first scenes are loaded
   const SceneIds& ids_;
   SceneTrees& trees_;
-  std::atomic<bool> give_way_{false}, stopping_{false};
+  const DerivedFiles* const files_;  // null: no --cache-dir
+  Background::JobId gives_way_ = 0;  // the last such load
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

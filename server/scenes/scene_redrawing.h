@@ -1,17 +1,13 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/thread_pool.hpp>
-
 #include "server/base/clock.h"
-#include "server/scenes/scene_catalog.h"
+#include "server/scenes/scene_index.h"
+#include "server/scenes/scene_loader.h"
 #include "server/scenes/scene_residency.h"
-#include "server/scenes/scene_shelf.h"
 #include "server/scenes/scene_trees.h"
 
 namespace catgs {
@@ -26,43 +22,34 @@ inline SceneNeed need_of(const SceneEntry& entry) {
 /// damaged is built again. Session thread only.
 class SceneRedrawing {
  public:
-  using Load = std::function<LoadedScene(const FoundScene& found, const SceneForm& form)>;
-
-  /// `load` is called on `loader`. All outlive this object, and its tasks.
-  SceneRedrawing(SceneShelf& shelf, SceneTrees& trees, SceneResidency& residency,
-                 boost::asio::io_context& io, boost::asio::thread_pool& loader, Load load)
-      : shelf_(shelf),
-        trees_(trees),
-        residency_(residency),
-        io_(io),
-        loader_(loader),
-        load_(std::move(load)) {}
+  /// All outlive this object, and its tasks.
+  SceneRedrawing(SceneIndex& index, SceneTrees& trees, SceneResidency& residency,
+                 SceneLoader& loader)
+      : index_(index), trees_(trees), residency_(residency), loader_(loader) {}
 
   struct Tick {
-    std::vector<std::string> too_large;  // ids of unused scenes whose two forms do not fit together
-    bool changed = false;                // the listing has
+    std::vector<std::string>
+        too_large;         // ids of unused scenes whose two representations do not fit together
+    bool changed = false;  // the listing has
   };
   Tick on_tick(TimePoint now);
 
-  /// True while a scene takes the memory of two forms. One of them goes soon.
-  [[nodiscard]] bool holds_two_forms() const;
+  /// True while a scene takes the memory of two representations. One of them goes soon.
+  [[nodiscard]] bool holds_two_representations() const;
 
   /// See SceneSource.
-  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& seen) const;
+  [[nodiscard]] std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& seen) const;
 
  private:
   void start(const std::string& id);
   void on_loaded(const std::string& id, const FoundScene& found, LoadedScene loaded,
                  const std::shared_ptr<Renderer>& before);
-  /// Frees a scene on the loader's thread, because that may wait for the device.
-  void free_later(std::shared_ptr<const SceneEntry> entry);
 
-  SceneShelf& shelf_;
+  SceneIndex& index_;
   SceneTrees& trees_;
   SceneResidency& residency_;
-  boost::asio::io_context& io_;
-  boost::asio::thread_pool& loader_;
-  const Load load_;
+  SceneLoader& loader_;
   bool busy_ = false;
   bool changed_ = false;  // the listing, since the last tick
 };

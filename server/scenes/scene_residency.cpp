@@ -10,23 +10,23 @@ void SceneResidency::pin(const std::string& id, const SceneNeed& need) {
   residents_.insert_or_assign(id, Resident{need, true, {}, {}});
 }
 
-SceneResidency::Wish SceneResidency::want(const std::string& id, const SceneNeed& need,
-                                          TimePoint now, const UseOf& use_of) {
+SceneResidency::Answer SceneResidency::want(const std::string& id, const SceneNeed& need,
+                                            TimePoint now, const UseOf& use_of) {
   if (resident(id)) {
     note_use(id, now);
-    return Wish::resident;
+    return Answer::resident;
   }
   if (loading_ == id) in_background_ = false;
-  if (awaited(id)) return Wish::awaited;
-  if (!could_fit(need)) return Wish::too_large;
+  if (awaited(id)) return Answer::awaited;
+  if (!could_fit(need)) return Answer::too_large;
   if (!room_for(need, [&](const auto& other, const Resident&) {
         return use_of(other) != SceneUse::visitors;
       }))
-    return Wish::no_room;
+    return Answer::no_room;
   // A load for a background job gives way soon. Until then, each who asks again has to wait.
-  if (waiting_) return in_background_ ? Wish::awaited : Wish::busy;
+  if (waiting_) return in_background_ ? Answer::awaited : Answer::busy;
   waiting_ = {id, need};
-  return Wish::awaited;
+  return Answer::awaited;
 }
 
 std::optional<SceneResidency::Step> SceneResidency::next(TimePoint now, const UseOf& use_of) {

@@ -26,7 +26,7 @@ struct SceneNeed {
   SceneNeed(std::uint64_t of_bytes, bool is_in_pages = false)  // NOLINT: bytes are a need
       : bytes(is_in_pages ? 0 : of_bytes), in_pages(is_in_pages) {}
 
-  /// That of two forms of one scene.
+  /// That of two representations of one scene.
   [[nodiscard]] SceneNeed with(const SceneNeed& other) const {
     SceneNeed both = *this;
     both.bytes += other.bytes;
@@ -57,14 +57,14 @@ class SceneResidency {
   /// Adds a scene that stays in memory for good.
   void pin(const std::string& id, const SceneNeed& need);
 
-  enum class Wish {
+  enum class Answer {
     resident,   // it is in memory
     awaited,    // it is being loaded, or next
     too_large,  // there will never be room for it
     no_room,    // visitors look at those in memory
     busy,       // one is being loaded and one waits
   };
-  Wish want(const std::string& id, const SceneNeed& need, TimePoint now, const UseOf& use_of);
+  Answer want(const std::string& id, const SceneNeed& need, TimePoint now, const UseOf& use_of);
 
   /// The next step for the waiting scene. Do `release` first, because it makes room.
   struct Step {

@@ -30,8 +30,8 @@ class SceneSource {
   [[nodiscard]] virtual std::vector<std::string> scene_ids() const = 0;
   /// Resolves a name to a scene's id. A name that stands for no scene or for several is returned
   /// unchanged.
-  [[nodiscard]] virtual std::string resolve(std::string_view wish) const {
-    return std::string(wish);
+  [[nodiscard]] virtual std::string resolve(std::string_view name) const {
+    return std::string(name);
   }
   [[nodiscard]] virtual bool has(const std::string& id) const = 0;
   /// Requests a scene for a client that may see it. The scene stays in memory as long as its entry
@@ -39,9 +39,10 @@ class SceneSource {
   virtual SceneAnswer want(const std::string& id, TimePoint now) = 0;
   /// Somebody may want the scene soon. It is loaded where that costs nobody another scene.
   virtual void prepare(const std::string& /*id*/, TimePoint /*now*/) {}
-  /// The entry that replaces one that a visitor sees, of the same scene in another form; null: it
-  /// stays.
-  [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_form(const SceneEntry& /*seen*/) {
+  /// The entry that replaces one that a visitor sees, of the same scene in another representation;
+  /// null: it stays.
+  [[nodiscard]] virtual std::shared_ptr<const SceneEntry> newer_representation(
+      const SceneEntry& /*seen*/) {
     return nullptr;
   }
   /// Call it at least four times a second.

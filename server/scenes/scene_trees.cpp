@@ -5,13 +5,11 @@
 #include <system_error>
 #include <utility>
 
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "server/base/log_event.h"
-#include "server/base/prompt_thread.h"
 #include "server/scenes/tree_builder.h"
 
 namespace catgs {
@@ -26,31 +24,21 @@ constexpr double assumed_gaussians_per_second = 300e3;
 // Of the Gaussians that a build sorts.
 constexpr std::uint64_t least_build_bytes = 256'000'000, most_build_bytes = 1'000'000'000;
 
-/// Ends a build from within.
-struct Cancelled {};
-
 int percent(double fraction) { return static_cast<int>(100.0 * fraction); }
 
 }  // namespace
 
-SceneTrees::SceneTrees(const ServerConfig& config, int threads, boost::asio::io_context& io,
-                       Metrics& metrics, std::function<TimePoint()> clock,
+SceneTrees::SceneTrees(const ServerConfig& config, DerivedFiles* cache, int threads,
+                       Background& background, boost::asio::io_context& io, Metrics& metrics,
+                       std::function<TimePoint()> clock,
                        std::function<bool(std::uint64_t bytes)> could_fit)
     : config_(config),
       threads_(threads),
-      io_(io),
       metrics_(metrics),
       clock_(std::move(clock)),
-      could_fit_(std::move(could_fit)) {
-  if (config_.cache_dir.empty()) return;
-  cache_.emplace(config_.cache_dir);
-  builder_.emplace(1);
-}
-
-SceneTrees::~SceneTrees() {
-  if (running_) running_->cancelled = true;
-  if (builder_) builder_->join();
-}
+      could_fit_(std::move(could_fit)),
+      cache_(cache),
+      jobs_(background, io) {}
 
 bool SceneTrees::ready(const FoundScene& scene) const {
   return cache_ && cache_->contains(scene.tree);
@@ -64,15 +52,16 @@ bool SceneTrees::needs_one(const FoundScene& scene) const {
   return !scene.tree.empty() && !could_fit_(scene.size.bytes());
 }
 
-std::optional<SceneForm> SceneTrees::form_of(const FoundScene& scene) const {
-  SceneForm form;
+std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScene& scene) const {
+  SceneRepresentation representation;
   if (ready(scene)) {
-    form.tree = cache_->path_of(scene.tree);
+    representation.tree = cache_->path_of(scene.tree);
   } else if (needs_one(scene)) {
     if (!scene.location.has_levels()) return std::nullopt;
-    form.most_gaussians = tree_memory(config_) / GaussianCloud::bytes(1, scene.size.sh_degree);
+    representation.most_gaussians =
+        tree_memory(config_) / GaussianCloud::bytes(1, scene.size.sh_degree);
   }
-  return form;
+  return representation;
 }
 
 SceneSize SceneTrees::size_of(const FoundScene& scene) const {
@@ -92,51 +81,35 @@ SceneNeed SceneTrees::need_of(const FoundScene& scene) const {
 
 void SceneTrees::order(const FoundScene& scene, bool urgent) {
   if (given_up(scene)) return;
-  if (running_ && !running_->cancelled && running_->scene.tree == scene.tree) {
-    running_->urgent |= urgent;
-    return;
-  }
-  const auto known =
-      std::ranges::find_if(waiting_, [&](const Order& o) { return o.scene.tree == scene.tree; });
-  if (known != waiting_.end() && (known->urgent || !urgent)) return;
-  if (known != waiting_.end()) waiting_.erase(known);
-  const auto behind = urgent ? std::ranges::find(waiting_, false, &Order::urgent) : waiting_.end();
-  waiting_.insert(behind, {scene, urgent});
+  const Priority priority = urgent ? Priority::high : Priority::low;
+  SharedBuild& known = builds_[scene.tree];
+  if (known && urgent) jobs_.set_priority(known->job, priority);
+  if (known) return;
+  const SharedBuild ordered = known = std::make_shared<Build>();
+  ordered->scene = scene;
   changed_ = true;
-  // A tree that nobody waits for is built later.
-  if (urgent && running_ && !running_->urgent && !running_->cancelled.exchange(true))
-    waiting_.push_back({running_->scene, false});
-  start_next();
-}
-
-void SceneTrees::start_next() {
-  if (running_ || waiting_.empty()) return;
-  running_ = std::make_shared<Build>();
-  running_->scene = std::move(waiting_.front().scene);
-  running_->urgent = waiting_.front().urgent;
-  running_->started = clock_();
-  waiting_.pop_front();
-  logged_ = running_->started;
-  changed_ = true;
-  log_info({.event = "tree_building", .scene = running_->scene.id},
-           "scene {}: building its tree from {}", running_->scene.id,
-           running_->scene.location.given.string());
-  boost::asio::post(*builder_, [this, running = running_] {
-    run_in_background();
-    std::string error;
-    try {
-      build(running->scene, [&](double progress) {
-        if (running->cancelled) throw Cancelled();
-        running->progress = progress;
-      });
-    } catch (const Cancelled&) {
-    } catch (const std::exception& failure) {
-      error = failure.what();
-    }
-    boost::asio::post(io_, [this, known = std::weak_ptr(running), error] {
-      if (const auto built = known.lock()) on_built(*built, error);  // else all this has ended
-    });
-  });
+  ordered->job = jobs_.start_then(
+      lanes::trees, priority,
+      [this, ordered](const std::stop_token& stop) {
+        log_info({.event = "tree_building", .scene = ordered->scene.id},
+                 "scene {}: building its tree from {}", ordered->scene.id,
+                 ordered->scene.location.given.string());
+        const TimePoint started = Clock::now();
+        ordered->progress = 0.0;
+        ordered->begun = true;
+        try {
+          build(ordered->scene, [&](double progress) {
+            throw_if_stopped(stop);
+            ordered->progress = progress;
+          });
+        } catch (...) {
+          ordered->begun = false;  // it may start anew
+          throw;
+        }
+        ordered->begun = false;
+        return Clock::now() - started;
+      },
+      [this, ordered](const Finished<Clock::duration>& built) { on_built(ordered, built); });
 }
 
 void SceneTrees::build(const FoundScene& scene, const std::function<void(double)>& progress) const {
@@ -168,43 +141,49 @@ void SceneTrees::build_now(const FoundScene& scene) {
   metrics_.trees_built.Increment();
 }
 
-void SceneTrees::on_built(const Build& build, const std::string& error) {
-  const FoundScene& scene = build.scene;
-  cache_->add(scene.tree);
-  if (build.cancelled || !error.empty()) cache_->remove(scene.tree);
-  if (!build.cancelled && !error.empty()) {
+void SceneTrees::on_built(const SharedBuild& build, const Finished<Clock::duration>& built) {
+  const FoundScene& scene = build->scene;
+  const auto known = builds_.find(scene.tree);
+  const bool wanted = known != builds_.end() && known->second == build;
+  if (wanted) builds_.erase(known);
+  changed_ = true;
+  if (!built.error.empty()) {
     metrics_.tree_builds_failed.Increment();
-    give_up(scene, error);
-  } else if (!build.cancelled) {
+    if (wanted) give_up(scene, built.error);
+  } else if (built.result) {
+    cache_->add(scene.tree);
+    if (!wanted) return;
     metrics_.trees_built.Increment();
     log_info({.event = "tree_built", .scene = scene.id},
              "scene {}: its tree is ready after {:.1f} s", scene.id,
-             std::chrono::duration<double>(clock_() - build.started).count());
+             std::chrono::duration<double>(*built.result).count());
   }
-  running_.reset();
-  changed_ = true;
-  start_next();
+}
+
+SceneTrees::SharedBuild SceneTrees::running() const {
+  const auto build =
+      std::ranges::find_if(builds_, [](const auto& of) { return of.second->begun.load(); });
+  return build == builds_.end() ? nullptr : build->second;
 }
 
 std::chrono::seconds SceneTrees::estimate(const FoundScene& scene) const {
   const double gaussians = static_cast<double>(scene.size.gaussians);
   double seconds = gaussians / assumed_gaussians_per_second;
-  if (running_ && running_->scene.tree == scene.tree) {
+  const SharedBuild build = running();
+  if (build && build->started && build->scene.tree == scene.tree) {
     constexpr double tells_something = 0.02;
-    const double done = running_->progress;
-    const std::chrono::duration<double> taken = clock_() - running_->started;
+    const double done = build->progress;
+    const std::chrono::duration<double> taken = clock_() - *build->started;
     seconds = done >= tells_something ? taken.count() * (1.0 - done) / done : seconds;
   }
   return std::chrono::seconds(1 + static_cast<std::int64_t>(seconds));
 }
 
 std::string SceneTrees::state_of(const FoundScene& scene) const {
-  if (scene.tree.empty()) return {};
-  if (running_ && running_->scene.tree == scene.tree)
-    return fmt::format("building tree {} %", percent(running_->progress));
-  const bool waits = std::ranges::any_of(
-      waiting_, [&](const Order& order) { return order.scene.tree == scene.tree; });
-  return waits ? "tree waits to be built" : "";
+  const auto build = builds_.find(scene.tree);
+  if (build == builds_.end()) return {};
+  if (!build->second->begun) return "tree waits to be built";
+  return fmt::format("building tree {} %", percent(build->second->progress));
 }
 
 void SceneTrees::discard(const FoundScene& scene, const std::string& why) {
@@ -230,19 +209,26 @@ bool SceneTrees::given_up(const FoundScene& scene) const {
 
 void SceneTrees::keep(const std::set<std::string>& names) {
   if (!cache_) return;
-  std::erase_if(waiting_, [&](const Order& order) { return !names.contains(order.scene.tree); });
+  std::erase_if(builds_, [&](const auto& of) {
+    if (names.contains(of.first)) return false;
+    jobs_.cancel(of.second->job);
+    return true;
+  });
   std::erase_if(given_up_, [&](const auto& of) { return !names.contains(of.first); });
   std::erase_if(discarded_, [&](const auto& of) { return !names.contains(of.first); });
-  if (running_ && !names.contains(running_->scene.tree)) running_->cancelled = true;
   cache_->keep(names);
 }
 
 bool SceneTrees::on_tick(TimePoint now) {
-  const double progress = running_ ? running_->progress.load() : 0.0;
-  if (running_ && now - *logged_ >= progress_interval) {
-    logged_ = now;
-    log_info({.event = "tree_building", .scene = running_->scene.id},
-             "scene {}: {} % of its tree is built", running_->scene.id, percent(progress));
+  const SharedBuild build = running();
+  const double progress = build ? build->progress.load() : 0.0;
+  for (const auto& [name, other] : builds_)
+    if (other != build) other->started.reset();  // it may have to start anew
+  if (build && !build->started) build->started = build->logged = now;
+  if (build && now - *build->logged >= progress_interval) {
+    build->logged = now;
+    log_info({.event = "tree_building", .scene = build->scene.id},
+             "scene {}: {} % of its tree is built", build->scene.id, percent(progress));
   }
   metrics_.tree_progress.Set(progress);
   changed_ |= std::exchange(told_percent_, percent(progress)) != percent(progress);

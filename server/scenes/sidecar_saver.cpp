@@ -6,7 +6,6 @@
 #include <system_error>
 #include <utility>
 
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
@@ -43,62 +42,46 @@ HttpResponse tagged(int status, std::string text, std::string etag) {
   return response;
 }
 
-HttpResponse stopping() { return busy_response("503: the server stops\n"); }
-
 }  // namespace
+
+SidecarSaver::Request::~Request() {
+  place.reset();  // it is free before the answer comes
+  promise.set_value(std::move(answer));
+}
 
 std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json,
                                              Precondition precondition,
                                              std::shared_ptr<const UploadPlace> place) {
-  auto request = std::make_shared<Request>(
-      Request{std::move(scene_id), std::move(json), std::move(precondition), std::move(place)});
-  auto future = request->answer.get_future();
-  boost::asio::post(io_, [this, request = std::move(request)] {
-    if (stopped_) return request->answer.set_value(stopping());
-    waiting_.push_back(request);
-    start_next();
+  const auto request = std::make_shared<Request>();
+  request->scene_id = std::move(scene_id);
+  request->json = std::move(json);
+  request->precondition = std::move(precondition);
+  request->place = std::move(place);
+  auto future = request->promise.get_future();
+  // Saves run before posters, because those that wait together need only one poster.
+  jobs_.start(lanes::sidecars, Priority::high, [this, request](const std::stop_token& stop) {
+    request->answer = answer(*request, stop);
   });
   return future;
 }
 
-void SidecarSaver::stop() {
-  stopped_ = true;
-  for (const SharedRequest& request : waiting_) request->answer.set_value(stopping());
-  waiting_.clear();
-}
-
-/// Saves run first, because those that wait together need only one poster.
-void SidecarSaver::start_next() {
-  while (!busy_ && !waiting_.empty()) {
-    const SharedRequest request = std::move(waiting_.front());
-    waiting_.pop_front();
-    if (!request->place->abandoned()) start_save(request);
+HttpResponse SidecarSaver::answer(Request& request, const std::stop_token& stop) {
+  if (request.place->abandoned()) return busy_response("503: the connection is closed\n");
+  request.entry =
+      ask_session_thread(io_, stop, [&] { return scenes_.lease(request.scene_id).entry; });
+  if (!request.entry)
+    return text_response(409, "409: the scene is not in memory: open it, then save\n");
+  if (request.entry->sidecar.empty())
+    return text_response(409, "409: this scene is generated, so there is no file to save beside\n");
+  Outcome outcome;
+  try {
+    outcome = write(request);
+  } catch (const std::exception& failure) {  // memory, say: it costs this save only
+    log_error({.event = "save_failed", .scene = request.scene_id}, "scene {}: a save failed: {}",
+              request.scene_id, failure.what());
+    return text_response(500, "500: the server failed to save: try again\n");
   }
-  while (!busy_ && !stopped_ && !posters_due_.empty())
-    start_poster(posters_due_.extract(posters_due_.begin()).value());
-}
-
-void SidecarSaver::start_save(const SharedRequest& request) {
-  request->entry = scenes_.lease(request->scene_id).entry;
-  if (!request->entry)
-    return request->answer.set_value(
-        text_response(409, "409: the scene is not in memory: open it, then save\n"));
-  if (request->entry->sidecar.empty())
-    return request->answer.set_value(
-        text_response(409, "409: this scene is generated, so there is no file to save beside\n"));
-  busy_ = true;
-  boost::asio::post(writer_, [this, request] {
-    Outcome outcome;
-    try {
-      outcome = write(*request);
-    } catch (const std::exception& failure) {  // memory, say: it costs this save only
-      log_error({.event = "save_failed", .scene = request->scene_id}, "scene {}: a save failed: {}",
-                request->scene_id, failure.what());
-      outcome.answer = text_response(500, "500: the server failed to save: try again\n");
-    }
-    boost::asio::post(io_,
-                      [this, request, outcome = std::move(outcome)] { finish(*request, outcome); });
-  });
+  return ask_session_thread(io_, stop, [&] { return apply(request, outcome); });
 }
 
 /// `there`: what is in force instead, and its tag.
@@ -159,7 +142,7 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
 }
 
 void SidecarSaver::remove_stale_files_in(std::set<std::filesystem::path> folders) {
-  boost::asio::post(writer_, [folders = std::move(folders)] {
+  jobs_.start(lanes::sidecars, Priority::normal, [folders = std::move(folders)](const auto&) {
     for (const std::filesystem::path& folder : folders) {
       remove_stale_files(folder, surely_stale);
       std::error_code error;
@@ -171,30 +154,28 @@ void SidecarSaver::remove_stale_files_in(std::set<std::filesystem::path> folders
   });
 }
 
-void SidecarSaver::finish(Request& request, const Outcome& outcome) {
-  busy_ = false;
-  if (outcome.revised) {
-    if (!outcome.revised->poster || !same_poster(outcome.revised->facts, request.entry->facts))
-      posters_due_.insert(request.scene_id);
-    scenes_.revise(request.scene_id, outcome.revised);
-  }
-  request.answer.set_value(outcome.answer);
-  start_next();
+HttpResponse SidecarSaver::apply(const Request& request, const Outcome& outcome) {
+  if (!outcome.revised) return outcome.answer;
+  const std::string& id = request.scene_id;
+  const bool same = same_poster(outcome.revised->facts, request.entry->facts);
+  if ((!outcome.revised->poster || !same) && posters_due_.insert(id).second)
+    jobs_.start(lanes::sidecars, Priority::normal,
+                [this, id](const std::stop_token& stop) { render_poster(id, stop); });
+  scenes_.revise(id, outcome.revised);
+  return outcome.answer;
 }
 
-void SidecarSaver::start_poster(const std::string& scene_id) {
-  auto scene = scenes_.lease(scene_id).entry;
+void SidecarSaver::render_poster(const std::string& scene_id, const std::stop_token& stop) {
+  const auto scene = ask_session_thread(io_, stop, [&] {
+    posters_due_.erase(scene_id);
+    return scenes_.lease(scene_id).entry;
+  });
   if (!scene) return;
-  busy_ = true;
-  boost::asio::post(writer_, [this, scene_id, scene = std::move(scene)] {
-    auto shown = std::make_shared<SceneEntry>(*scene);
-    if (auto poster = make_poster(*shown->renderer, shown->facts))
-      shown->poster = std::move(poster);
-    boost::asio::post(io_, [this, scene_id, shown = std::move(shown)] {
-      busy_ = false;
-      scenes_.revise(scene_id, shown);
-      start_next();
-    });
+  const auto shown = std::make_shared<SceneEntry>(*scene);
+  if (auto poster = make_poster(*shown->renderer, shown->facts)) shown->poster = std::move(poster);
+  ask_session_thread(io_, stop, [&] {
+    scenes_.revise(scene_id, shown);
+    return true;
   });
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <deque>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -11,8 +10,8 @@
 #include <vector>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/thread_pool.hpp>
 
+#include "server/base/background.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
 #include "server/scenes/scene_library.h"
@@ -26,63 +25,57 @@ class SidecarSaver {
  public:
   /// `io` runs the session thread and outlives this object. `media_origins`: sites that tours may
   /// show media of.
-  SidecarSaver(SceneLibrary& scenes, boost::asio::io_context& io,
+  SidecarSaver(SceneLibrary& scenes, Background& background, boost::asio::io_context& io,
                std::vector<std::string> media_origins = {})
-      : scenes_(scenes), io_(io), media_origins_(std::move(media_origins)) {}
-  ~SidecarSaver() { writer_.join(); }
-  SidecarSaver(const SidecarSaver&) = delete;
-  SidecarSaver& operator=(const SidecarSaver&) = delete;
+      : scenes_(scenes), io_(io), media_origins_(std::move(media_origins)), jobs_(background) {}
 
   /// Any thread. The future is ready when visitors get the saved sidecar. The caller has checked
   /// the sender's permission. If the sidecar on disk does not meet `precondition`, it is kept and
   /// applied, as another server may have written it. The answer is then 412 with its tag. Servers
   /// that share a folder look at the sidecar and replace it one after the other. Requests run one
-  /// after the other, too; one with an abandoned place is dropped without an answer.
+  /// after the other, too; one with an abandoned place is dropped.
   std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition,
                                  std::shared_ptr<const UploadPlace> place);
 
   /// Removes what killed servers have left in these folders and in the media folders there.
   void remove_stale_files_in(std::set<std::filesystem::path> folders);
 
-  /// Session thread. The current save finishes. Waiting and later saves are answered with 503.
-  void stop();
+  /// The current save finishes. Waiting and later saves are answered with 503.
+  void stop() { jobs_.close(); }
 
  private:
   struct Request {
-    std::string scene_id;
-    std::string json;
-    Precondition precondition;
-    std::shared_ptr<const UploadPlace> place;
+    ~Request();  // answers
+
+    std::string scene_id{};
+    std::string json{};
+    Precondition precondition{};
+    std::shared_ptr<const UploadPlace> place{};
     std::shared_ptr<const SceneEntry> entry{};
-    std::promise<HttpResponse> answer{};
+    std::promise<HttpResponse> promise{};
+    HttpResponse answer = busy_response("503: the server stops\n");
   };
   struct Outcome {
     HttpResponse answer;
     std::shared_ptr<const SceneEntry> revised{};  // null: the scene stays as it is
   };
-  using SharedRequest = std::shared_ptr<Request>;
 
-  // Session thread.
-  void start_next();
-  void start_save(const SharedRequest& request);
-  void start_poster(const std::string& scene_id);
-  void finish(Request& request, const Outcome& outcome);
-  // Writer thread.
+  // In the background.
+  HttpResponse answer(Request& request, const std::stop_token& stop);
+  void render_poster(const std::string& scene_id, const std::stop_token& stop);
   [[nodiscard]] Outcome write(const Request& request) const;
   [[nodiscard]] Outcome refuse_outdated(const Request& request,
                                         const std::optional<std::string>& there,
                                         const std::string& tag) const;
 
+  /// Session thread.
+  HttpResponse apply(const Request& request, const Outcome& outcome);
+
   SceneLibrary& scenes_;
   boost::asio::io_context& io_;
   const std::vector<std::string> media_origins_;
-  // Session thread.
-  std::deque<SharedRequest> waiting_;
-  std::set<std::string> posters_due_;  // ids of scenes
-  bool busy_ = false;                  // the writer thread works on one of them
-  bool stopped_ = false;
-  // A separate thread, so that neither sockets nor visits wait for a slow disk.
-  boost::asio::thread_pool writer_{1};
+  std::set<std::string> posters_due_;  // ids of scenes; session thread
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

@@ -236,7 +236,8 @@ void Place::on_tick(TimePoint now) {
   StreamControl& stream = visit_.stream();
   visit_.on_tick(now, stream.ready() && stream_->view && stream_->view->outdated());
   if (visit_.life().resumable() && !visit_.life().lost())
-    if (auto newer = around_.scenes.newer_form(*stream.scene())) stream.redraw(std::move(newer));
+    if (auto newer = around_.scenes.newer_representation(*stream.scene()))
+      stream.redraw(std::move(newer));
   if (visit_.life().on_show() && stream.scene())
     tally_.on_show(stream.scene()->facts.scene_id, visitor_.device,
                    visit_.statistics().bytes_sent(), now);

@@ -20,7 +20,7 @@ LONGER_FUNCTIONS = {
     "tests/render_core/scene/formats/encoders.cpp: encode_sog": 101,
 }
 MORE_METHODS = {
-    "Audience": 25, "FlowControl": 25, "Place": 25, "Places": 25, "SceneLibrary": 25, "StreamControl": 25,
+    "Audience": 25, "FlowControl": 25, "Place": 25, "Places": 25, "StreamControl": 25,
     "TreeShape": 25, "Visit": 25,
 }
 MORE_FIELDS = {}

@@ -9,7 +9,7 @@
 #include "render_core/scene/files/hints.h"
 #include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/streamed_sog.h"
-#include "server/films/film_wish.h"
+#include "server/films/film_request.h"
 #include "server/scenes/tours.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/temporary_folder.h"
@@ -142,11 +142,12 @@ std::map<std::string, std::string> sent_sidecar_seeds() {
 }
 
 void parse_film(Bytes input) {
-  const FilmWish wish = parse_film_wish(text_of(input));
-  require(!wish.views.empty() && wish.views.size() <= most_film_frames, "films begin and end");
-  require(wish.size_px.x >= 16 && wish.size_px.x <= 8192, "pictures have a width");
-  require(wish.size_px.y >= 16 && wish.size_px.y <= 4320, "pictures have a height");
-  for (const FilmView& view : wish.views) {
+  const FilmRequest request = parse_film_request(text_of(input));
+  require(!request.views.empty() && request.views.size() <= most_film_frames,
+          "films begin and end");
+  require(request.size_px.x >= 16 && request.size_px.x <= 8192, "pictures have a width");
+  require(request.size_px.y >= 16 && request.size_px.y <= 4320, "pictures have a height");
+  for (const FilmView& view : request.views) {
     require_sound(view.world_from_camera);
     require(view.fov_y_rad > 0.08f && view.fov_y_rad < 2.8f, "fields of view are sane");
   }

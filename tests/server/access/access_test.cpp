@@ -30,8 +30,8 @@ class AccessTest : public testing::Test {
     return access.permit(token, now_unix_s, one_hall).refusal(scene_id, use);
   }
   /// Of a server on which one scene alone is called "hall".
-  static std::string one_hall(std::string_view wish) {
-    return wish == "hall" ? "hall-bcdfghjk" : std::string(wish);
+  static std::string one_hall(std::string_view name) {
+    return name == "hall" ? "hall-bcdfghjk" : std::string(name);
   }
   const test::TemporaryFolder folder;
 };
@@ -201,8 +201,10 @@ TEST_F(AccessTest, LostAndEmptyListsAreToldOnce) {
   const auto revoked = folder.write("revoked", "\n"),
              tokens = folder.write("tokens", "alpha-alpha\n");
   std::optional<AccessControl> access;
-  EXPECT_THAT(test::lines_of("human", "info", [&] { access.emplace(tokens, {}, false, revoked); }),
-              ElementsAre(AllOf(HasSubstr("--revoked-links"), HasSubstr("no link is revoked"))));
+  EXPECT_THAT(
+      test::lines_of("human", "info",
+                     [&] { access.emplace(tokens, std::filesystem::path(), false, revoked); }),
+      ElementsAre(AllOf(HasSubstr("--revoked-links"), HasSubstr("no link is revoked"))));
   const auto use = [&] {
     for (int i = 0; i < 3; ++i) (void)access->permit("alpha-alpha", 0, one_hall);
   };

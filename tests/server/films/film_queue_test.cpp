@@ -16,7 +16,8 @@ using namespace std::chrono_literals;
 class FilmQueueTest : public testing::Test {
  protected:
   std::string order(const std::string& owner) {
-    const auto added = queue.add("hall", owner, FilmWish{FilmKind::film, {16, 16}, {FilmView{}}});
+    const auto added =
+        queue.add("hall", owner, FilmRequest{FilmKind::film, {16, 16}, {FilmView{}}});
     const auto* id = std::get_if<std::string>(&added);
     return id ? *id : "";
   }
@@ -41,7 +42,7 @@ TEST_F(FilmQueueTest, DrawsOneAfterTheOther) {
   const auto started = queue.start_next();
   ASSERT_TRUE(started);
   EXPECT_EQ(started->id, first);
-  EXPECT_EQ(started->wish.views.size(), 1u);
+  EXPECT_EQ(started->request.views.size(), 1u);
   now += 10s;
   EXPECT_TRUE(queue.drawn(first, 0.25));
   EXPECT_EQ(queue.left(*queue.find(first)), 30s);

@@ -226,11 +226,12 @@ class SecondScene : public testing::Test {
     ServerConfig config;
     config.scenes = {"synth:city:2000"};
     config.scene_folders = {folder_.path()};
+    Background background;
     boost::asio::io_context io;
     const auto waits = boost::asio::make_work_guard(io);
     SceneLibrary library(
-        config, {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices_}, io,
-        metrics_);
+        config, {RendererKind::automatic, std::make_shared<ThreadPool>(1), "auto", devices_},
+        background, io, metrics_);
     const std::string attic = library.resolve("attic");
     EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library.want(attic, Clock::now())));
     const TimePoint end = Clock::now() + std::chrono::seconds(20);  // a bound against hanging

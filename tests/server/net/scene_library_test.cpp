@@ -82,9 +82,9 @@ TEST_F(SceneLibraryTest, LoadsAnExhibitWhenSomebodyAsksForIt) {
                                        {"loaded", true}}));
   EXPECT_EQ(scenes[1].at("gaussians"), 5000) << "from the header alone";
   EXPECT_FALSE(loaded("attic"));
-  const HttpReply ground = http_get(server_->port(), "/api/scenes/attic/walk");
-  EXPECT_EQ(ground.status, 404) << "nobody seeks it before the scene is in memory";
-  EXPECT_EQ(ground.headers.count("retry-after"), 1u);
+  const HttpReply walkable_area = http_get(server_->port(), "/api/scenes/attic/walk");
+  EXPECT_EQ(walkable_area.status, 404) << "nobody seeks it before the scene is in memory";
+  EXPECT_EQ(walkable_area.headers.count("retry-after"), 1u);
   const auto client = connect();
   client->send(hello("attic"));
   EXPECT_TRUE(client->receive_message(v1::ServerMessage::kQueue).queue().for_scene());

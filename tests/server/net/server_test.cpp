@@ -378,14 +378,14 @@ TEST(Server, SaysThatNobodyWalksWithoutAWord) {
   save_scene(random_cloud(300, 0), folder / "dust.ply");
   RunningServer server(
       [&](ServerConfig& config) { config.scenes = {(folder / "dust.ply").string()}; });
-  HttpReply ground;
+  HttpReply walkable_area;
   ASSERT_TRUE(eventually([&] {
-    ground = http_get(server.port(), "/api/scenes/dust/walk");
-    return ground.status != 202;
+    walkable_area = http_get(server.port(), "/api/scenes/dust/walk");
+    return walkable_area.status != 202;
   }));
-  EXPECT_EQ(ground.status, 204);
-  EXPECT_EQ(ground.headers.count("content-length"), 0u);
-  EXPECT_EQ(ground.headers.count("content-type"), 0u);
+  EXPECT_EQ(walkable_area.status, 204);
+  EXPECT_EQ(walkable_area.headers.count("content-length"), 0u);
+  EXPECT_EQ(walkable_area.headers.count("content-type"), 0u);
 }
 
 TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
@@ -393,17 +393,17 @@ TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
   const auto ask = [&](const std::map<std::string, std::string>& headers = {}) {
     return http_get(server.port(), "/api/scenes/city/walk", headers);
   };
-  HttpReply ground = ask();
-  EXPECT_EQ(ground.status, 202);
-  EXPECT_EQ(ground.headers.at("retry-after"), "3");
-  for (int i = 0; i < 2400 && ground.status == 202; ++i) {
+  HttpReply walkable_area = ask();
+  EXPECT_EQ(walkable_area.status, 202);
+  EXPECT_EQ(walkable_area.headers.at("retry-after"), "3");
+  for (int i = 0; i < 2400 && walkable_area.status == 202; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    ground = ask();
+    walkable_area = ask();
   }
-  ASSERT_EQ(ground.status, 200);
-  EXPECT_THAT(ground.body, testing::StartsWith("catgswlk"));
-  EXPECT_EQ(ground.headers.at("content-type"), "application/octet-stream");
-  EXPECT_EQ(ask({{"if-none-match", ground.headers.at("etag")}}).status, 304);
+  ASSERT_EQ(walkable_area.status, 200);
+  EXPECT_THAT(walkable_area.body, testing::StartsWith("catgswlk"));
+  EXPECT_EQ(walkable_area.headers.at("content-type"), "application/octet-stream");
+  EXPECT_EQ(ask({{"if-none-match", walkable_area.headers.at("etag")}}).status, 304);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/base/clock.h"
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
@@ -25,8 +25,9 @@ using testing::Not;
 class Visits : public testing::Test {
  protected:
   Visits() {
+    Background background;
     VisitCounts counts([this] { return day_s_; });
-    const VisitBook book(folder_.path(), counts);
+    const UsageStatistics statistics(folder_.path(), counts, background);
     for (int day = 0; day < 5; ++day, day_s_ -= 86'400)
       for (std::uint32_t stop = 0; stop < 2000; ++stop) counts.reach("hall", {0, stop});
   }

@@ -40,7 +40,7 @@ class SceneCatalog : public FolderTest {
     save_scene(random_cloud(30, 0), folder_ / "plain.splat");
     config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
   }
-  std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneForm& form = {}) {
+  std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneRepresentation& form = {}) {
     return load_scene(
         locate_scenes(config_).at(scene), form, [](const std::string& name) { return name; },
         config_,

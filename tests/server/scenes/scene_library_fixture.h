@@ -38,8 +38,8 @@ class SceneLibraryTime : public FolderTest {
   }
   void start() {
     library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
-        [this] { return now_; });
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
+        io_, metrics_, [this] { return now_; });
   }
 
   /// What the loader is through with comes to be known.
@@ -76,6 +76,7 @@ class SceneLibraryTime : public FolderTest {
   /// So much later.
   void tick(std::chrono::seconds later) { library_->on_tick(now_ += later); }
 
+  Background background_;
   boost::asio::io_context io_;
   Metrics metrics_;
   ServerConfig config_;

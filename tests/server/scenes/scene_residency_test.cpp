@@ -11,19 +11,19 @@ namespace {
 using namespace std::chrono_literals;
 using testing::ElementsAre;
 using testing::IsEmpty;
-using Wish = SceneResidency::Wish;
+using Answer = SceneResidency::Answer;
 
 class SceneResidencyTest : public testing::Test {
  protected:
   explicit SceneResidencyTest(std::uint64_t pool_bytes = 0)
       : residency_({.budget_bytes = 100, .pool_bytes = pool_bytes, .min_residency = 60s}) {}
-  Wish want(const std::string& id, std::uint64_t bytes) {
+  Answer want(const std::string& id, std::uint64_t bytes) {
     return residency_.want(id, bytes, now_, use_of_);
   }
   std::optional<SceneResidency::Step> next() { return residency_.next(now_, use_of_); }
   /// It is wanted, loaded and left.
   void visit(const std::string& id, std::uint64_t bytes) {
-    ASSERT_EQ(want(id, bytes), Wish::awaited) << id;
+    ASSERT_EQ(want(id, bytes), Answer::awaited) << id;
     const auto step = next();
     ASSERT_TRUE(step && step->load == id) << id;
     residency_.loaded(id, bytes, now_);
@@ -40,17 +40,17 @@ class SceneResidencyTest : public testing::Test {
 };
 
 TEST_F(SceneResidencyTest, LoadsOnDemandOneAtATime) {
-  EXPECT_EQ(want("a", 30), Wish::awaited);
-  EXPECT_EQ(want("a", 30), Wish::awaited) << "a second visitor waits for the same";
+  EXPECT_EQ(want("a", 30), Answer::awaited);
+  EXPECT_EQ(want("a", 30), Answer::awaited) << "a second visitor waits for the same";
   const auto step = next();
   ASSERT_TRUE(step);
   EXPECT_EQ(step->load, "a");
   EXPECT_THAT(step->release, IsEmpty());
   EXPECT_FALSE(next()) << "it is under way";
-  EXPECT_EQ(want("a", 30), Wish::awaited);
+  EXPECT_EQ(want("a", 30), Answer::awaited);
   EXPECT_FALSE(residency_.resident("a"));
   residency_.loaded("a", 31, now_);
-  EXPECT_EQ(want("a", 30), Wish::resident);
+  EXPECT_EQ(want("a", 30), Answer::resident);
   EXPECT_EQ(residency_.bytes(), 31u) << "what it really takes";
 }
 
@@ -58,7 +58,7 @@ TEST_F(SceneResidencyTest, FewTreesAreInMemoryAtATime) {
   const SceneNeed tree(1000, true);
   const auto name = [](std::size_t i) { return "tree " + std::to_string(100 + i); };
   for (std::size_t i = 0; i <= most_scenes_in_pages; ++i) {
-    ASSERT_EQ(residency_.want(name(i), tree, now_, use_of_), Wish::awaited) << i;
+    ASSERT_EQ(residency_.want(name(i), tree, now_, use_of_), Answer::awaited) << i;
     const auto step = next();
     ASSERT_TRUE(step) << i;
     if (i < most_scenes_in_pages) {
@@ -70,18 +70,18 @@ TEST_F(SceneResidencyTest, FewTreesAreInMemoryAtATime) {
     now_ += 100s;
   }
   for (std::size_t i = 1; i <= most_scenes_in_pages; ++i) used_.insert(name(i));
-  EXPECT_EQ(residency_.want(name(0), tree, now_, use_of_), Wish::no_room);
+  EXPECT_EQ(residency_.want(name(0), tree, now_, use_of_), Answer::no_room);
 }
 
 TEST_F(SceneResidencyTest, OneWaitsWhileOneIsLoadedAndOthersAreRefused) {
   want("a", 10);
   next();
-  EXPECT_EQ(want("b", 10), Wish::awaited);
-  EXPECT_EQ(want("c", 10), Wish::busy);
+  EXPECT_EQ(want("b", 10), Answer::awaited);
+  EXPECT_EQ(want("c", 10), Answer::busy);
   EXPECT_FALSE(next());
   residency_.loaded("a", 10, now_);
   EXPECT_EQ(next()->load, "b");
-  EXPECT_EQ(want("c", 10), Wish::awaited);
+  EXPECT_EQ(want("c", 10), Answer::awaited);
 }
 
 TEST_F(SceneResidencyTest, TheLeastRecentlyUsedGoes) {
@@ -90,7 +90,7 @@ TEST_F(SceneResidencyTest, TheLeastRecentlyUsedGoes) {
   visit("b", 40);
   now_ += 120s;
   residency_.note_use("a", now_);
-  EXPECT_EQ(want("c", 40), Wish::awaited);
+  EXPECT_EQ(want("c", 40), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("b"));
   EXPECT_FALSE(residency_.resident("b"));
   EXPECT_TRUE(residency_.resident("a"));
@@ -112,23 +112,23 @@ TEST_F(SceneResidencyTest, ASceneInUseNeverGoes) {
   visit("a", 60);
   used_ = {"a"};
   now_ += 1h;
-  EXPECT_EQ(want("b", 60), Wish::no_room);
+  EXPECT_EQ(want("b", 60), Answer::no_room);
   EXPECT_FALSE(next());
   visit("c", 40);
   now_ += 1h;
-  EXPECT_EQ(want("b", 60), Wish::no_room) << "nor is another sent away in vain";
+  EXPECT_EQ(want("b", 60), Answer::no_room) << "nor is another sent away in vain";
   EXPECT_TRUE(residency_.resident("c"));
   used_.clear();
-  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_EQ(want("b", 60), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("a"));
 }
 
 TEST_F(SceneResidencyTest, ASceneStaysForAMinuteAndTheNextOneWaitsForThat) {
   visit("a", 60);
   now_ += 59s;
-  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_EQ(want("b", 60), Answer::awaited);
   EXPECT_FALSE(next());
-  EXPECT_EQ(want("a", 60), Wish::resident) << "it is still there for who comes back";
+  EXPECT_EQ(want("a", 60), Answer::resident) << "it is still there for who comes back";
   now_ += 1s;
   const auto step = next();
   ASSERT_TRUE(step);
@@ -138,30 +138,30 @@ TEST_F(SceneResidencyTest, ASceneStaysForAMinuteAndTheNextOneWaitsForThat) {
 
 TEST_F(SceneResidencyTest, WhoWaitsHearsWhenTheRoomIsTakenAgain) {
   visit("a", 60);
-  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_EQ(want("b", 60), Answer::awaited);
   used_ = {"a"};
   now_ += 60s;
   EXPECT_FALSE(next());
-  EXPECT_EQ(want("b", 60), Wish::no_room);
-  EXPECT_EQ(want("c", 10), Wish::awaited) << "it blocks nobody";
+  EXPECT_EQ(want("b", 60), Answer::no_room);
+  EXPECT_EQ(want("c", 10), Answer::awaited) << "it blocks nobody";
 }
 
 TEST_F(SceneResidencyTest, RefusesWhatNeverFits) {
-  EXPECT_EQ(want("a", 101), Wish::too_large);
-  EXPECT_EQ(want("a", 100), Wish::awaited);
+  EXPECT_EQ(want("a", 101), Answer::too_large);
+  EXPECT_EQ(want("a", 100), Answer::awaited);
   residency_.pin("p", 20);
-  EXPECT_EQ(want("b", 81), Wish::too_large) << "pinned scenes never go";
+  EXPECT_EQ(want("b", 81), Answer::too_large) << "pinned scenes never go";
   SceneResidency unbounded({});
-  EXPECT_EQ(unbounded.want("a", 1ull << 50, now_, use_of_), Wish::awaited);
+  EXPECT_EQ(unbounded.want("a", 1ull << 50, now_, use_of_), Answer::awaited);
 }
 
 TEST_F(SceneResidencyTest, PinnedScenesStay) {
   residency_.pin("p", 50);
-  EXPECT_EQ(want("p", 50), Wish::resident);
+  EXPECT_EQ(want("p", 50), Answer::resident);
   now_ += 1h;
   visit("a", 50);
   now_ += 1h;
-  EXPECT_EQ(want("b", 50), Wish::awaited);
+  EXPECT_EQ(want("b", 50), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("a"));
 }
 
@@ -173,13 +173,13 @@ TEST_F(SceneResidencyTest, AFailureLeavesRoomForTheNext) {
   EXPECT_FALSE(residency_.resident("a"));
   EXPECT_EQ(next()->load, "b");
   residency_.loaded("b", 50, now_);
-  EXPECT_EQ(want("a", 50), Wish::awaited) << "it may be tried again";
+  EXPECT_EQ(want("a", 50), Answer::awaited) << "it may be tried again";
 }
 
 TEST_F(SceneResidencyTest, BackgroundJobLetsGoOfASceneForAVisitor) {
   visit("a", 60);
   leased_ = {"a"};
-  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_EQ(want("b", 60), Answer::awaited);
   EXPECT_FALSE(next()) << "a scene stays for a minute";
   now_ += 60s;
   const auto step = next();
@@ -201,7 +201,7 @@ TEST_F(SceneResidencyTest, UnusedSceneGoesBeforeOneOfABackgroundJob) {
   leased_ = {"a"};
   now_ += 60s;
   residency_.note_use("a", now_);
-  EXPECT_EQ(want("c", 50), Wish::awaited);
+  EXPECT_EQ(want("c", 50), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("b"));
 }
 
@@ -219,7 +219,7 @@ TEST_F(SceneResidencyTest, BackgroundJobGetsRoomThatNobodyHasUsedForAMinute) {
     EXPECT_FALSE(for_job());
     set->clear();
   }
-  EXPECT_EQ(want("b", 60), Wish::awaited);
+  EXPECT_EQ(want("b", 60), Answer::awaited);
   EXPECT_FALSE(for_job()) << "a visitor waits";
   residency_.failed(next()->load);
   const auto step = for_job();
@@ -230,17 +230,17 @@ TEST_F(SceneResidencyTest, BackgroundJobGetsRoomThatNobodyHasUsedForAMinute) {
 TEST_F(SceneResidencyTest, LoadOfABackgroundJobRefusesNobody) {
   ASSERT_TRUE(residency_.next_in_background("f", 60, now_, use_of_));
   EXPECT_TRUE(residency_.loads_in_background());
-  for (const char* id : {"a", "b", "c"}) EXPECT_EQ(want(id, 60), Wish::awaited) << id;
+  for (const char* id : {"a", "b", "c"}) EXPECT_EQ(want(id, 60), Answer::awaited) << id;
   residency_.failed("f");
   EXPECT_EQ(next()->load, "a");
-  EXPECT_EQ(want("b", 30), Wish::awaited);
-  EXPECT_EQ(want("c", 30), Wish::busy) << "a visitor's load is under way";
+  EXPECT_EQ(want("b", 30), Answer::awaited);
+  EXPECT_EQ(want("c", 30), Answer::busy) << "a visitor's load is under way";
 }
 
 TEST_F(SceneResidencyTest, SceneOfABackgroundJobGoesAtOnceForAVisitor) {
   ASSERT_TRUE(residency_.next_in_background("f", 60, now_, use_of_));
   residency_.loaded("f", 60, now_);
-  EXPECT_EQ(want("a", 60), Wish::awaited);
+  EXPECT_EQ(want("a", 60), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("f"));
 }
 
@@ -249,7 +249,7 @@ class SharedPoolTest : public SceneResidencyTest {
   SharedPoolTest() : SceneResidencyTest(50) {}
   static SceneNeed pages() { return {1'000'000, true}; }
   void visit_tree(const std::string& id) {
-    ASSERT_EQ(residency_.want(id, pages(), now_, use_of_), Wish::awaited) << id;
+    ASSERT_EQ(residency_.want(id, pages(), now_, use_of_), Answer::awaited) << id;
     const auto step = next();
     ASSERT_TRUE(step && step->load == id) << id;
     residency_.loaded(id, pages(), now_);
@@ -262,14 +262,14 @@ TEST_F(SharedPoolTest, TheFirstTreeTakesThePoolAndTheOthersNothing) {
   EXPECT_EQ(residency_.bytes(), 50u);
   visit_tree("hall");
   EXPECT_EQ(residency_.bytes(), 50u);
-  EXPECT_EQ(want("whole", 50), Wish::awaited);
+  EXPECT_EQ(want("whole", 50), Answer::awaited);
   EXPECT_THAT(next()->release, IsEmpty());
 }
 
 TEST_F(SharedPoolTest, AllTreesGoForAWholeSceneThatNeedsThePool) {
   visit_tree("city");
   visit_tree("hall");
-  EXPECT_EQ(want("whole", 60), Wish::awaited);
+  EXPECT_EQ(want("whole", 60), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("city", "hall"));
   residency_.loaded("whole", 60, now_);
   EXPECT_EQ(residency_.bytes(), 60u);
@@ -281,7 +281,7 @@ TEST_F(SharedPoolTest, TreesStayWhereTheirPoolDoes) {
   visit("whole", 40);
   now_ += 120s;
   used_ = {"hall"};
-  EXPECT_EQ(want("other", 30), Wish::awaited);
+  EXPECT_EQ(want("other", 30), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("whole"));
 }
 
@@ -289,14 +289,14 @@ TEST_F(SharedPoolTest, AWholeSceneGoesForThePool) {
   visit("whole", 60);
   now_ += 120s;
   EXPECT_FALSE(residency_.has_room(pages()));
-  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Wish::awaited);
+  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Answer::awaited);
   EXPECT_THAT(next()->release, ElementsAre("whole"));
 }
 
 TEST_F(SharedPoolTest, WholeScenesInUseKeepTheTreesOut) {
   visit("whole", 60);
   used_ = {"whole"};
-  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Wish::no_room);
+  EXPECT_EQ(residency_.want("city", pages(), now_, use_of_), Answer::no_room);
 }
 
 }  // namespace

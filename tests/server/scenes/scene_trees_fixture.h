@@ -38,8 +38,8 @@ class SceneTreesTest : public FolderTest {
   void start() {
     library_.reset();  // which takes the cache with it
     library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_,
-        [this] { return now_; });
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
+        io_, metrics_, [this] { return now_; });
   }
   /// Lets loads and builds end, and ticks, until it holds.
   void run_until(const std::function<bool()>& holds) {
@@ -80,6 +80,7 @@ class SceneTreesTest : public FolderTest {
   double built() const { return metrics_.trees_built.Value(); }
   double failed() const { return metrics_.tree_builds_failed.Value(); }
 
+  Background background_;
   boost::asio::io_context io_;
   Metrics metrics_;
   ServerConfig config_;

@@ -44,21 +44,18 @@ class SidecarSaverTest : public FolderTest {
     ServerConfig config;
     config.scenes = {(folder_ / "hall.ply").string(), "synth:city:1000"};
     library_ = std::make_unique<SceneLibrary>(
-        config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, io_, metrics_);
-    saver_ = std::make_unique<SidecarSaver>(*library_, io_);
+        config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
+        io_, metrics_);
+    saver_ = std::make_unique<SidecarSaver>(*library_, background_, io_);
     hall_ = library_->resolve("hall");
     scene_ = library_->in_memory(hall_);
     posters_.insert(scene_->poster);
   }
   void TearDown() override { saver_.reset(); }
 
-  /// Until now nothing is done: handlers run by steps() and run_until() alone.
+  /// The scene stays as it is until run_until() runs the session thread's handlers.
   Saved save(const std::string& json, const std::string& if_match = "") {
     return saver_->save(hall_, json, {if_match, ""}, place_);
-  }
-  void steps(int handlers) {
-    io_.restart();
-    for (int i = 0; i < handlers; ++i) ASSERT_EQ(io_.run_one(), 1u);
   }
   /// Notes each poster that visitors get meanwhile.
   void run_until(const std::function<bool()>& holds) {
@@ -69,17 +66,19 @@ class SidecarSaverTest : public FolderTest {
     }
     ASSERT_TRUE(holds());
   }
-  /// Whatever was asked for before is done when a save of a scene that is no file is answered.
+  /// Until the posters of the saves so far are done, if they need any.
   void run_all() {
-    for (int i = 0; i < 2; ++i) {  // its poster may follow a save
-      const Saved last = saver_->save("city", "{}", {}, place_);
-      run_until([&] { return is_ready(last); });
-    }
+    std::promise<void> done;
+    auto last = done.get_future();
+    Background::Jobs jobs(background_);
+    jobs.start(lanes::sidecars, Priority::low, [&](const auto&) { done.set_value(); });
+    run_until([&] { return last.wait_for(0s) == std::future_status::ready; });
   }
   [[nodiscard]] std::string on_disk() const {
     return sidecar_text(folder_ / "hall.json").value_or("");
   }
 
+  Background background_;
   boost::asio::io_context io_;
   Metrics metrics_;
   std::unique_ptr<SceneLibrary> library_;
@@ -158,7 +157,10 @@ TEST_F(SidecarSaverTest, WhatTheAuthorSaysIsShownAtOnce) {
 TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
   Saved begun = save(sidecar_at(1));
   Saved waits = save(sidecar_at(2));
-  steps(2);
+  while (io_.poll_one() == 0) {  // until the first save has its scene
+    io_.restart();
+    std::this_thread::yield();
+  }
   saver_->stop();
   ASSERT_TRUE(is_ready(waits));
   const HttpResponse refused = waits.get();
@@ -178,8 +180,8 @@ class Saver {
  public:
   Saver(const ServerConfig& config, std::string name) : name_(std::move(name)) {
     library_.emplace(config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(1)},
-                     io_, metrics_);
-    saver_.emplace(*library_, io_);
+                     background_, io_, metrics_);
+    saver_.emplace(*library_, background_, io_);
     thread_ = std::thread([this] { io_.run(); });
   }
   ~Saver() {
@@ -203,6 +205,7 @@ class Saver {
  private:
   const std::string name_;
   Metrics metrics_;
+  Background background_;
   boost::asio::io_context io_;
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> idle_{
       io_.get_executor()};

@@ -1,6 +1,6 @@
 // Counts of visits over days and starts, and the pages that show them.
 
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 
 #include <atomic>
 #include <filesystem>
@@ -35,7 +35,7 @@ constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
 constexpr std::int64_t day_s = 86'400;
 constexpr const char* today = "2025-11-25";
 
-class VisitBookTest : public testing::Test {
+class UsageStatisticsTest : public testing::Test {
  protected:
   [[nodiscard]] std::size_t files() const {
     const auto is_day = [](const fs::directory_entry& entry) {
@@ -47,8 +47,8 @@ class VisitBookTest : public testing::Test {
   [[nodiscard]] fs::path file_of(const std::string& date) const {
     return folder_ / ("visits-" + date + ".json");
   }
-  VisitsPage page_of(const VisitBook& book) {
-    return {book, [this] { return now_s_.load(); }, [this](const auto&) { return titles_; }};
+  VisitsPage page_of(const UsageStatistics& statistics) {
+    return {statistics, [this] { return now_s_.load(); }, [this](const auto&) { return titles_; }};
   }
   static HttpResponse charts(const VisitsPage& page, std::vector<std::string> arguments) {
     HttpRequest request;
@@ -62,14 +62,15 @@ class VisitBookTest : public testing::Test {
   }
 
   const TemporaryFolder folder_;
+  Background background_;
   std::atomic<std::int64_t> now_s_{noon};
   VisitCounts counts_{[this] { return now_s_.load(); }};
   VisitsPage::Titles titles_;
 };
 
-TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
+TEST_F(UsageStatisticsTest, CountsStayFromOneStartToTheNext) {
   {
-    const VisitBook book(folder_.path(), counts_);
+    const UsageStatistics statistics(folder_.path(), counts_, background_);
     counts_.visit("hall \"A\"", DeviceKind::tablet);
     counts_.spend("hall \"A\"", 12.5, 1'000'000'000'000);
     counts_.reach("hall \"A\"", {1, 2});
@@ -77,9 +78,9 @@ TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
     counts_.visit("garden", DeviceKind::headset);
   }
   EXPECT_TRUE(counts_.dates().empty()) << "what is in a file is in memory no more";
-  const VisitBook book(folder_.path(), counts_);
-  EXPECT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
-  const SceneCounts hall = book.day(today).at("hall \"A\"");
+  const UsageStatistics statistics(folder_.path(), counts_, background_);
+  EXPECT_THAT(statistics.dates(), ElementsAre(today, "2025-11-26"));
+  const SceneCounts hall = statistics.day(today).at("hall \"A\"");
   EXPECT_EQ(hall.visits, 1u);
   EXPECT_EQ(hall.seconds, 12.5);
   EXPECT_EQ(hall.bytes, 1'000'000'000'000u);
@@ -87,53 +88,54 @@ TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
   EXPECT_EQ(hall.stops, (std::map<StopId, std::uint64_t>{{{1, 2}, 1}}));
   EXPECT_EQ(files(), 2u);
   counts_.visit("garden", DeviceKind::headset);
-  EXPECT_EQ(book.day("2025-11-26").at("garden").visits, 2u) << "in the file, and not yet there";
+  EXPECT_EQ(statistics.day("2025-11-26").at("garden").visits, 2u)
+      << "in the file, and not yet there";
 }
 
-TEST_F(VisitBookTest, WithoutAFolderCountsStayInMemory) {
-  const VisitBook book({}, counts_);
+TEST_F(UsageStatisticsTest, WithoutAFolderCountsStayInMemory) {
+  const UsageStatistics statistics({}, counts_, background_);
   counts_.visit("hall", DeviceKind::tablet);
-  EXPECT_THAT(book.dates(), ElementsAre(today));
-  EXPECT_EQ(book.day(today).at("hall").visits, 1u);
+  EXPECT_THAT(statistics.dates(), ElementsAre(today));
+  EXPECT_EQ(statistics.day(today).at("hall").visits, 1u);
 }
 
-TEST_F(VisitBookTest, ADayWithinAllLimitsIsReadAgain) {
+TEST_F(UsageStatisticsTest, ADayWithinAllLimitsIsReadAgain) {
   const std::string first = std::string(120, 'x') + "0";
   for (std::size_t i = 0; i < VisitCounts::most_scenes + 5; ++i)
     counts_.visit(std::string(120, 'x') + std::to_string(i), DeviceKind::unknown);
   for (std::uint32_t i = 0; i < VisitCounts::most_stops + 5; ++i)
     counts_.reach(first, {i / 256, i % 256});
-  { const VisitBook book(folder_.path(), counts_); }
+  { const UsageStatistics statistics(folder_.path(), counts_, background_); }
   counts_.visit("one more", DeviceKind::unknown);
   counts_.reach(first, {1'000, 0});
-  { const VisitBook book(folder_.path(), counts_); }
-  const DayCounts day = VisitBook(folder_.path(), counts_).day(today);
+  { const UsageStatistics statistics(folder_.path(), counts_, background_); }
+  const DayCounts day = UsageStatistics(folder_.path(), counts_, background_).day(today);
   EXPECT_EQ(day.size(), VisitCounts::most_scenes + 1);
   EXPECT_EQ(day.at(std::string(VisitCounts::other_scenes)).visits, 6u);
   EXPECT_EQ(day.at(first).stops.size(), VisitCounts::most_stops);
 }
 
-TEST_F(VisitBookTest, TheStartReadsNoDay) {
+TEST_F(UsageStatisticsTest, TheStartReadsNoDay) {
   std::ofstream(file_of("2025-11-24")) << R"({"scenes":{"hall":{"visits":-1}}})";
   ASSERT_EQ(::mkfifo(file_of("2025-11-23").c_str(), 0600), 0);
   std::ofstream(folder_ / "visits-notes.json") << "of somebody else";
-  const VisitBook book(folder_.path(), counts_);
+  const UsageStatistics statistics(folder_.path(), counts_, background_);
   EXPECT_TRUE(fs::exists(file_of("2025-11-24")));
-  EXPECT_THAT(book.dates(), ElementsAre("2025-11-23", "2025-11-24"));
-  for (const std::string& date : book.dates()) {
-    EXPECT_TRUE(book.day(date).empty());
+  EXPECT_THAT(statistics.dates(), ElementsAre("2025-11-23", "2025-11-24"));
+  for (const std::string& date : statistics.dates()) {
+    EXPECT_TRUE(statistics.day(date).empty());
     EXPECT_FALSE(fs::exists(file_of(date)));
     EXPECT_TRUE(fs::exists(file_of(date).string() + ".damaged")) << "it is set aside";
   }
   EXPECT_TRUE(fs::exists(folder_ / "visits-notes.json"));
 }
 
-TEST_F(VisitBookTest, OldDaysAreDeleted) {
+TEST_F(UsageStatisticsTest, OldDaysAreDeleted) {
   for (std::size_t i = 0; i < VisitCounts::most_days + 3; ++i)
     std::ofstream(file_of(date_of(noon - static_cast<std::int64_t>(i) * day_s))) << "{}";
   {
-    const VisitBook book(folder_.path(), counts_);
-    EXPECT_EQ(book.dates().size(), VisitCounts::most_days);
+    const UsageStatistics statistics(folder_.path(), counts_, background_);
+    EXPECT_EQ(statistics.dates().size(), VisitCounts::most_days);
     now_s_ += day_s;
     counts_.visit("hall", DeviceKind::unknown);
   }
@@ -141,18 +143,18 @@ TEST_F(VisitBookTest, OldDaysAreDeleted) {
   EXPECT_TRUE(fs::exists(file_of("2025-11-26")));
 }
 
-TEST_F(VisitBookTest, AFolderServesOneServerAtATime) {
+TEST_F(UsageStatisticsTest, AFolderServesOneServerAtATime) {
   const auto refused = [&](const fs::path& folder) -> std::string {
     try {
       VisitCounts counts([] { return noon; });
-      const VisitBook book(folder, counts);
+      const UsageStatistics statistics(folder, counts, background_);
     } catch (const InputError& error) {
       return error.what();
     }
     return "";
   };
   {
-    const VisitBook book(folder_.path(), counts_);
+    const UsageStatistics statistics(folder_.path(), counts_, background_);
     EXPECT_THAT(refused(folder_.path()),
                 AllOf(HasSubstr("--visit-counts"), HasSubstr("another server")));
   }
@@ -166,39 +168,39 @@ TEST_F(VisitBookTest, AFolderServesOneServerAtATime) {
   EXPECT_THAT(refused(folder_ / "file"), AllOf(HasSubstr("--visit-counts"), HasSubstr("file")));
 }
 
-TEST_F(VisitBookTest, ADayThatCannotBeWrittenWaits) {
+TEST_F(UsageStatisticsTest, ADayThatCannotBeWrittenWaits) {
   fs::create_directories(file_of(today).string() + ".damaged/inside");
   fs::create_directories(file_of(today) / "inside");
   {
-    const VisitBook book(folder_.path(), counts_);
+    const UsageStatistics statistics(folder_.path(), counts_, background_);
     counts_.visit("hall", DeviceKind::unknown);
   }
   EXPECT_EQ(counts_.day(today).at("hall").visits, 1u);
   fs::remove_all(file_of(today));
-  { const VisitBook book(folder_.path(), counts_); }
-  EXPECT_EQ(VisitBook(folder_.path(), counts_).day(today).at("hall").visits, 1u);
+  { const UsageStatistics statistics(folder_.path(), counts_, background_); }
+  EXPECT_EQ(UsageStatistics(folder_.path(), counts_, background_).day(today).at("hall").visits, 1u);
 }
 
-TEST_F(VisitBookTest, ADayThatCannotBeOpenedNowIsReadLater) {
+TEST_F(UsageStatisticsTest, ADayThatCannotBeOpenedNowIsReadLater) {
   std::ofstream(file_of(today)) << counts_json({{"hall", {.visits = 1}}});
-  const VisitBook book(folder_.path(), counts_);
+  const UsageStatistics statistics(folder_.path(), counts_, background_);
   {
     const DescriptorLimit none_is_left(next_descriptor());
-    EXPECT_THROW((void)book.day(today), InputError);
+    EXPECT_THROW((void)statistics.day(today), InputError);
   }
-  EXPECT_EQ(book.day(today).at("hall").visits, 1u);
+  EXPECT_EQ(statistics.day(today).at("hall").visits, 1u);
 }
 
 /// Several visits go on while the clock passes midnight and is set back, and days are written and
 /// read all the time.
-TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
+TEST_F(UsageStatisticsTest, NothingIsLostOrCountedTwiceAtMidnight) {
   constexpr int visitors = 3, enough = 500;
   constexpr std::int64_t midnight = noon + day_s / 2;
   std::array<std::atomic<int>, 2> surely{};  // visits that began and ended on one day
   std::atomic<std::uint64_t> all{0};
   std::atomic<bool> ended{false}, grows{true};
   {
-    const VisitBook book(folder_.path(), counts_, 1ms);
+    const UsageStatistics statistics(folder_.path(), counts_, background_, 1ms);
     const auto visit = [&](std::uint32_t visitor) {
       TimePoint now = TimePoint{} + 1h;
       for (std::uint32_t i = 0; !ended; ++i, ++all) {
@@ -214,7 +216,7 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
     for (std::uint32_t i = 0; i < visitors; ++i) threads.emplace_back(visit, i);
     threads.emplace_back([&] {
       for (std::uint64_t seen = 0; !ended;) {
-        const DayCounts day = book.day("2025-11-26");
+        const DayCounts day = statistics.day("2025-11-26");
         const std::uint64_t now = day.empty() ? 0 : day.at("hall").visits;
         if (now < seen) grows = false;
         seen = now;
@@ -226,9 +228,10 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
     for (std::thread& thread : threads) thread.join();
   }
   EXPECT_TRUE(grows) << "a day lost visits for a while";
-  const VisitBook book(folder_.path(), counts_);
-  ASSERT_THAT(book.dates(), ElementsAre(today, "2025-11-26"));
-  const SceneCounts before = book.day(today).at("hall"), after = book.day("2025-11-26").at("hall");
+  const UsageStatistics statistics(folder_.path(), counts_, background_);
+  ASSERT_THAT(statistics.dates(), ElementsAre(today, "2025-11-26"));
+  const SceneCounts before = statistics.day(today).at("hall"),
+                    after = statistics.day("2025-11-26").at("hall");
   EXPECT_EQ(before.visits + after.visits, all);
   EXPECT_GE(before.visits, static_cast<std::uint64_t>(surely[0]));
   EXPECT_GE(after.visits, static_cast<std::uint64_t>(surely[1]));
@@ -240,9 +243,9 @@ TEST_F(VisitBookTest, NothingIsLostOrCountedTwiceAtMidnight) {
   EXPECT_EQ(stops, all);
 }
 
-TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
-  const VisitBook book({}, counts_);
-  const VisitsPage pages = page_of(book);
+TEST_F(UsageStatisticsTest, TheSummaryHasCountsAndTitles) {
+  const UsageStatistics statistics({}, counts_, background_);
+  const VisitsPage pages = page_of(statistics);
   counts_.visit("<hall>", DeviceKind::desktop);
   counts_.spend("<hall>", 7200.0, 3'000'000'000);
   counts_.reach("<hall>", {0, 0});
@@ -269,9 +272,9 @@ TEST_F(VisitBookTest, TheSummaryHasCountsAndTitles) {
   EXPECT_EQ(summary({"days=-5"}).at("title"), "Visits: all scenes, 1 days");
 }
 
-TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
-  const VisitBook book({}, counts_);
-  const VisitsPage pages = page_of(book);
+TEST_F(UsageStatisticsTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
+  const UsageStatistics statistics({}, counts_, background_);
+  const VisitsPage pages = page_of(statistics);
   counts_.visit("=1+\"1\"", DeviceKind::desktop);
   counts_.reach("=1+\"1\"", {0, 0});
   EXPECT_EQ(rest_of(pages.visits_csv()),
@@ -282,12 +285,12 @@ TEST_F(VisitBookTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {
 }
 
 /// The network thread asks for an answer. Another one makes its pieces.
-TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
+TEST_F(UsageStatisticsTest, PagesReadOneDayForEachPiece) {
   const auto write = [&](const char* date, const char* scene) {
     std::ofstream(file_of(date)) << counts_json({{scene, {.visits = 1, .stops = {{{0, 0}, 1}}}}});
   };
-  const VisitBook book(folder_.path(), counts_);
-  const VisitsPage pages = page_of(book);
+  const UsageStatistics statistics(folder_.path(), counts_, background_);
+  const VisitsPage pages = page_of(statistics);
   const std::map<std::string, std::function<HttpResponse()>> documents = {
       {"charts", [&] { return charts(pages, {"days=4"}); }},
       {"visits", [&] { return pages.visits_csv(); }},
@@ -309,11 +312,11 @@ TEST_F(VisitBookTest, PagesReadOneDayForEachPiece) {
   }
 }
 
-TEST_F(VisitBookTest, PiecesOfALongPageHaveALargestSize) {
-  const VisitBook book({}, counts_);
+TEST_F(UsageStatisticsTest, PiecesOfALongPageHaveALargestSize) {
+  const UsageStatistics statistics({}, counts_, background_);
   for (std::uint32_t i = 0; i < VisitCounts::most_stops; ++i)
     counts_.reach("hall", {i / 256, i % 256});
-  const VisitsPage pages = page_of(book);
+  const VisitsPage pages = page_of(statistics);
   const HttpResponse response = pages.stops_csv();
   std::size_t bytes = 0, pieces = 0;
   while (const auto piece = response.next_piece()) {

@@ -1,8 +1,9 @@
-#include "server/scenes/tree_cache.h"
+#include "server/scenes/derived_files.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <system_error>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "render_core/scene/tree/tree_file.h"
 #include "server/access/signed_token.h"
 #include "server/base/log_event.h"
+#include "server/base/replace_file.h"
 #include "server/scenes/scene_ids.h"
 
 namespace catgs {
@@ -25,33 +27,40 @@ namespace fs = std::filesystem;
 // A tree's file carries the time when its scene was last seen, about.
 constexpr std::chrono::hours noted_every{1}, kept_for{7 * 24};
 constexpr std::size_t path_digits = 8, content_digits = 16;
-constexpr std::string_view extension = ".tree";
+constexpr std::string_view tree_extension = ".tree";
 
-bool is_tree_name(std::string_view name) {
+bool is_derived_name(std::string_view name) {
   const auto ends_with_digits = [&](std::size_t digits) {
     if (name.size() <= digits || name[name.size() - digits - 1] != '-') return false;
     const bool hex = name.find_last_not_of("0123456789abcdef") == name.size() - digits - 1;
     name.remove_suffix(digits + 1);
     return hex;
   };
-  if (!name.ends_with(extension)) return false;
-  name.remove_suffix(extension.size());
+  name = name.substr(0, name.rfind('.'));
   return ends_with_digits(content_digits) && ends_with_digits(path_digits) && !name.empty();
 }
 
+bool is_tree_name(std::string_view name) {
+  return name.ends_with(tree_extension) && is_derived_name(name);
+}
+
 /// What a killed build leaves of a tree, besides NewFile: ScratchFile adds to its name. Earlier
-/// versions added ".part".
-bool is_remnant(std::string_view name) { return is_tree_name(name.substr(0, name.rfind('.'))); }
+/// versions added ".part", and named walkable areas by two digests alone.
+bool is_remnant(std::string_view name) {
+  constexpr std::size_t former_walk_digits = 16 + 1 + 32;
+  const std::size_t stem = name.rfind('.');
+  return is_tree_name(name.substr(0, stem)) ||
+         (name.ends_with(".walk") && stem == former_walk_digits &&
+          name.find_first_not_of("0123456789abcdef-") == stem);
+}
 
 std::string hex_digest(const std::string& text, std::size_t bytes) {
   const TokenDigest digest = digest_of(text);
   return fmt::format("{:02x}", fmt::join(std::span(digest).first(bytes), ""));
 }
 
-/// The part of a tree's name that stands for its scene.
-std::string_view scene_part(std::string_view name) {
-  return name.substr(0, name.size() - extension.size() - content_digits - 1);
-}
+/// The part of a name that stands for its scene.
+std::string_view scene_part(std::string_view name) { return name.substr(0, name.rfind('-')); }
 
 /// Letters, digits and dashes. A name is for operators who look into the folder.
 std::string plain(std::string_view name) {
@@ -96,6 +105,14 @@ Content content_of(const SceneLocation& scene) {
 
 }  // namespace
 
+std::string derived_name(const SceneLocation& scene, const std::string& facts,
+                         std::string_view extension) {
+  const std::string spec = scene.given.string();
+  return fmt::format("{}-{}-{}{}", plain(scene.name.empty() ? spec : scene.name),
+                     hex_digest(scene_key(spec), path_digits / 2),
+                     hex_digest(facts, content_digits / 2), extension);
+}
+
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
   const std::optional<SplatModel> model = model_in_sidecar(scene.hints);
   try {
@@ -105,15 +122,13 @@ std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
                     content.bytes, content.newest.time_since_epoch().count(),
                     levels.lod.value_or(-1), levels.gaussian_budget.value_or(0),
                     TreeHeader::right_version, model ? name_of(*model) : "");
-    return fmt::format("{}-{}-{}{}", plain(scene.name),
-                       hex_digest(scene_key(scene.given.string()), path_digits / 2),
-                       hex_digest(facts, content_digits / 2), extension);
+    return derived_name(scene, facts, tree_extension);
   } catch (const fs::filesystem_error& error) {
     throw InputError(scene.given.string(), {}, "cannot be read: " + error.code().message());
   }
 }
 
-TreeCache::TreeCache(fs::path folder)
+DerivedFiles::DerivedFiles(fs::path folder)
     : folder_(std::move(folder)), lock_(own_folder("--cache-dir", folder_, "lock")) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
@@ -126,13 +141,13 @@ TreeCache::TreeCache(fs::path folder)
   }
 }
 
-void TreeCache::remove(const std::string& name) {
+void DerivedFiles::remove(const std::string& name) {
   std::error_code error;
   fs::remove(path_of(name), error);
   names_.erase(name);
 }
 
-void TreeCache::keep(const std::set<std::string>& names) {
+void DerivedFiles::keep(const std::set<std::string>& names) {
   std::set<std::string_view> scenes;
   for (const std::string& name : names) scenes.insert(scene_part(name));
   std::vector<std::string> leaving;
@@ -149,6 +164,48 @@ void TreeCache::keep(const std::set<std::string>& names) {
   for (const std::string& name : leaving) {
     log_info({.event = "tree_removed"}, "the tree {} is removed: no scene needs it", name);
     remove(name);
+  }
+}
+
+std::optional<std::string> DerivedFiles::read(const std::string& name, std::size_t most_bytes,
+                                              const Check& check) const {
+  const fs::path path = path_of(name);
+  std::error_code error;
+  if (!fs::exists(path, error)) return std::nullopt;
+  try {
+    const std::vector<std::byte> bytes = FileSource(path).read_all(most_bytes);
+    check(MemorySource(path.string(), bytes));
+    fs::last_write_time(path, fs::file_time_type::clock::now(), error);
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  } catch (const InputError& failure) {
+    log_warning({.event = "cached_file_unusable"}, "removed: {}", failure.what());
+    fs::remove(path, error);
+    return std::nullopt;
+  }
+}
+
+void DerivedFiles::write(const std::string& name, const std::string& bytes) const {
+  const fs::path extension = fs::path(name).extension();
+  std::vector<std::pair<fs::file_time_type, fs::path>> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code gone;
+    const std::string other = entry->path().filename().string();
+    if (is_derived_name(other) && other != name && entry->path().extension() == extension)
+      files.emplace_back(entry->last_write_time(gone), entry->path());
+  }
+  std::ranges::sort(files, std::greater<>());
+  std::size_t kept = 1, of_scene = 1;  // with the new one
+  for (const auto& [used, file] : files) {
+    const bool of_this_scene = scene_part(file.filename().string()) == scene_part(name);
+    const bool too_many = of_this_scene && ++of_scene > most_small_files_of_scene;
+    if (too_many || ++kept > most_small_files) fs::remove(file, error);
+  }
+  try {
+    overwrite_file(path_of(name), bytes, "make room in --cache-dir");
+  } catch (const InputError& failure) {  // a full disk costs the next start some time
+    log_warning({.event = "not_cached"}, "{}", failure.what());
   }
 }
 

@@ -1,4 +1,4 @@
-#include "server/films/film_artist.h"
+#include "server/films/film_worker.h"
 
 #include <array>
 #include <cstdlib>
@@ -21,9 +21,9 @@
 namespace catgs::test {
 namespace {
 
-class FilmArtist : public testing::Test {
+class FilmWorker : public testing::Test {
  protected:
-  FilmArtist() {
+  FilmWorker() {
     auto cloud = std::make_shared<GaussianCloud>(random_cloud(300, 0));
     // A sky: large ones around the view, whose projection is clamped.
     for (std::size_t i = 0; i < 60; ++i) {
@@ -68,7 +68,7 @@ class FilmArtist : public testing::Test {
   int calls = 0;
 };
 
-TEST_F(FilmArtist, APictureInPartsIsThePicture) {
+TEST_F(FilmWorker, APictureInPartsIsThePicture) {
   const glm::ivec2 size_px{2200, 1100};
   const Image picture = drawn(FilmKind::picture, size_px);
   EXPECT_GE(calls, 6) << "after each part";
@@ -81,19 +81,19 @@ TEST_F(FilmArtist, APictureInPartsIsThePicture) {
   EXPECT_GT(compare_images(copy_image(frame), picture).psnr(), 55.0);
 }
 
-TEST_F(FilmArtist, APanoramaShowsAllAround) {
+TEST_F(FilmWorker, APanoramaShowsAllAround) {
   const Image around = drawn(FilmKind::panorama, {256, 128});
   EXPECT_EQ(around.size_px, glm::ivec2(256, 128));
   EXPECT_GE(calls, 6) << "a side is one part";
 }
 
-TEST_F(FilmArtist, CancelledWhileItIsAssembledOrWritten) {
+TEST_F(FilmWorker, CancelledWhileItIsAssembledOrWritten) {
   EXPECT_TRUE(ends_between(0.851, 1.0, FilmKind::picture, {2200, 1100})) << "written";
   EXPECT_TRUE(ends_between(0.80, 0.849, FilmKind::panorama, {2048, 1024})) << "assembled";
   EXPECT_TRUE(ends_between(0.851, 1.0, FilmKind::panorama, {2048, 1024})) << "written";
 }
 
-TEST_F(FilmArtist, SceneIsLetGoWhereItIsNeededElsewhere) {
+TEST_F(FilmWorker, SceneIsLetGoWhereItIsNeededElsewhere) {
   int taken = 0;
   const auto take_again = [&] {
     ++taken;
@@ -101,34 +101,34 @@ TEST_F(FilmArtist, SceneIsLetGoWhereItIsNeededElsewhere) {
     return take();
   };
   ResultFile file, undisturbed;
-  const FilmWish wish{FilmKind::picture, {2200, 1100}, {view}};
-  draw_film(wish, take_again, file, [&](double share, Clock::duration) {
+  const FilmRequest wanted{FilmKind::picture, {2200, 1100}, {view}};
+  draw_film(wanted, take_again, file, [&](double share, Clock::duration) {
     ++leases->recalls;
     if (share > 0.851) {
       EXPECT_EQ(leases->held, 0) << "while the file is written";
     }
   });
   EXPECT_EQ(taken, 3) << "each is let go after the part that follows";
-  draw_film(wish, take, undisturbed, [](double, Clock::duration) {});
+  draw_film(wanted, take, undisturbed, [](double, Clock::duration) {});
   EXPECT_EQ(read_png(file.path()).rgb, read_png(undisturbed.path()).rgb);
 }
 
-TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
-  FilmWish wish{FilmKind::film, {64, 48}, {view, view}};
+TEST_F(FilmWorker, AFilmIsAnMp4AndCanBeCancelled) {
+  FilmRequest wanted{FilmKind::film, {64, 48}, {view, view}};
   for (int i = 0; i < 6; ++i) {
     view.world_from_camera.position.x += 0.1f;
-    wish.views.push_back(view);
+    wanted.views.push_back(view);
   }
   ResultFile file;
   int frames = 0;
-  draw_film(wish, take, file, [&](double, Clock::duration) { ++frames; });
+  draw_film(wanted, take, file, [&](double, Clock::duration) { ++frames; });
   EXPECT_GE(frames, 8);
   std::array<std::byte, 8> head{};
   ASSERT_TRUE(file.read(0, head));
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(head.data()) + 4, 4), "ftyp");
   frames = 0;
   ResultFile other;
-  EXPECT_THROW(draw_film(wish, take, other,
+  EXPECT_THROW(draw_film(wanted, take, other,
                          [&](double, Clock::duration) {
                            if (++frames == 3) throw std::runtime_error("cancelled");
                          }),
@@ -136,7 +136,7 @@ TEST_F(FilmArtist, AFilmIsAnMp4AndCanBeCancelled) {
   EXPECT_EQ(frames, 3);
 }
 
-TEST_F(FilmArtist, AFullFolderForResultsIsNamed) {
+TEST_F(FilmWorker, AFullFolderForResultsIsNamed) {
   const auto complaint = [&](FilmKind kind) -> std::string {
     ResultFile file;
     rlimit before{};
@@ -159,7 +159,7 @@ TEST_F(FilmArtist, AFullFolderForResultsIsNamed) {
     EXPECT_THAT(complaint(kind), testing::StartsWith(folder));
 }
 
-TEST_F(FilmArtist, AMissingFolderForResultsIsNamed) {
+TEST_F(FilmWorker, AMissingFolderForResultsIsNamed) {
   const char* const before = std::getenv("TMPDIR");
   const std::string kept = before ? before : "";
   ::setenv("TMPDIR", "/absent", 1);

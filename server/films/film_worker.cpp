@@ -1,4 +1,4 @@
-#include "server/films/film_artist.h"
+#include "server/films/film_worker.h"
 
 #include <algorithm>
 #include <stdexcept>
@@ -101,12 +101,13 @@ void draw_parts(FilmScene& scene, const FrameRequest& whole, Progress& progress,
   }
 }
 
-void draw_picture(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
-  const glm::ivec2 size_px = wish.size_px;
+void draw_picture(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
+                  Progress& progress) {
+  const glm::ivec2 size_px = wanted.size_px;
   const auto width = static_cast<std::size_t>(size_px.x);
   std::vector<std::uint8_t> bytes(3 * width * static_cast<std::size_t>(size_px.y));
-  draw_parts(scene, request_of(scene.entry(), wish.views.front(), size_px), progress, until_written,
-             [&](int x, int y, const float* rgb) {
+  draw_parts(scene, request_of(scene.entry(), wanted.views.front(), size_px), progress,
+             until_written, [&](int x, int y, const float* rgb) {
                std::uint8_t* const to = bytes.data() + 3 * (width * static_cast<std::size_t>(y) +
                                                             static_cast<std::size_t>(x));
                for (int c = 0; c < 3; ++c) to[c] = byte_of(rgb[c]);
@@ -116,13 +117,14 @@ void draw_picture(const FilmWish& wish, FilmScene& scene, ResultFile& file, Prog
   write_png(file.path(), size_px, bytes, [&] { progress.step(); });
 }
 
-void draw_around(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
-  FrameRequest request = request_of(scene.entry(), wish.views.front(), wish.size_px);
+void draw_around(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
+                 Progress& progress) {
+  FrameRequest request = request_of(scene.entry(), wanted.views.front(), wanted.size_px);
   request.camera.world_from_camera =
       levelled(request.camera.world_from_camera, scene.entry().facts.up);
   ThreadPool own(1);  // helpers would not be there for visitors meanwhile
   constexpr double sides = 6.0;
-  const auto rows = static_cast<std::size_t>(wish.size_px.y);
+  const auto rows = static_cast<std::size_t>(wanted.size_px.y);
   int drawn = 0;
   const auto draw_side = [&](const FrameRequest& of_side) {
     Image side{of_side.camera.size_px, {}};
@@ -139,7 +141,7 @@ void draw_around(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progr
     return side;
   };
   const Image image =
-      draw_panorama(request, wish.size_px, own, draw_side, [&] { progress.step(); });
+      draw_panorama(request, wanted.size_px, own, draw_side, [&] { progress.step(); });
   scene.let_go();
   progress.begin(1.0, rows);
   write_png(file.path(), image, {}, [&] { progress.step(); });
@@ -151,15 +153,16 @@ bool same(const FilmView& a, const FilmView& b) {
          a.fov_y_rad == b.fov_y_rad;
 }
 
-void draw_frames(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progress& progress) {
+void draw_frames(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
+                 Progress& progress) {
   const auto video =
-      make_mp4_file({file.path(), wish.size_px, film_fps, 1, [&] { progress.look(); }});
+      make_mp4_file({file.path(), wanted.size_px, film_fps, 1, [&] { progress.look(); }});
   FrameView frame;
-  const std::size_t count = wish.views.size();
+  const std::size_t count = wanted.views.size();
   progress.begin(1.0, count);
   for (std::size_t i = 0; i < count; ++i) {
-    if (!scene.has_view() || !same(wish.views[i], wish.views[i - 1]))
-      render(scene, request_of(scene.entry(), wish.views[i], wish.size_px), frame);
+    if (!scene.has_view() || !same(wanted.views[i], wanted.views[i - 1]))
+      render(scene, request_of(scene.entry(), wanted.views[i], wanted.size_px), frame);
     video->write(frame);
     if (file.size() > most_film_bytes)
       throw NotDrawn(fmt::format("the film is larger than {} MiB", most_film_bytes >> 20));
@@ -169,23 +172,23 @@ void draw_frames(const FilmWish& wish, FilmScene& scene, ResultFile& file, Progr
   video->finish();
 }
 
-void draw(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
+void draw(const FilmRequest& wanted, const FilmScene::Take& take, ResultFile& file,
           const OnDrawn& on_drawn) {
-  const bool film = wish.kind == FilmKind::film;
+  const bool film = wanted.kind == FilmKind::film;
   FilmScene scene(take, film ? PixelFormat::i420 : PixelFormat::rgb_f32);
   Progress progress(scene, on_drawn);
-  if (film) return draw_frames(wish, scene, file, progress);
-  if (wish.kind == FilmKind::panorama) return draw_around(wish, scene, file, progress);
-  draw_picture(wish, scene, file, progress);
+  if (film) return draw_frames(wanted, scene, file, progress);
+  if (wanted.kind == FilmKind::panorama) return draw_around(wanted, scene, file, progress);
+  draw_picture(wanted, scene, file, progress);
 }
 
 }  // namespace
 
 /// The file has no name, so that its folder tells operators where there is no room.
-void draw_film(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
+void draw_film(const FilmRequest& wanted, const FilmScene::Take& take, ResultFile& file,
                const OnDrawn& on_drawn) {
   try {
-    draw(wish, take, file, on_drawn);
+    draw(wanted, take, file, on_drawn);
   } catch (const InputError& failure) {
     std::string why = failure.what();
     const std::string path = file.path();

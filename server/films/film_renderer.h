@@ -1,20 +1,16 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/thread_pool.hpp>
 
 #include "server/access/authorize.h"
+#include "server/base/background.h"
 #include "server/films/film_queue.h"
 #include "server/net/http.h"
 #include "server/net/upload_places.h"
@@ -22,14 +18,15 @@
 
 namespace catgs {
 
-/// Takes authors' orders of pictures and films, draws them one after the other on a thread of low
-/// priority, and hands out the results. A job's id is 128 random bits: whoever knows it may ask for
+/// Takes authors' orders of pictures and films, draws them one after the other in the background,
+/// and hands out the results. A job's id is 128 random bits: whoever knows it may ask for
 /// it, until its order's link is revoked. While visitors look at scenes, at most half of the time
 /// is spent on drawing. A scene whose memory visitors need is let go between two pictures.
-class FilmStudio {
+class FilmRenderer {
  public:
   struct Surroundings {
     boost::asio::io_context& io;  // runs the session thread
+    Background& background;
     /// A hold on a scene in memory. `again`: it was in memory when the job was ordered. Session
     /// thread.
     std::function<LeasedScene(const std::string& scene_id, bool again)> lease;
@@ -38,10 +35,9 @@ class FilmStudio {
     /// A job whose scene was let go ends if it does not get the scene again in this time.
     std::chrono::milliseconds longest_wait = std::chrono::minutes(10);
   };
-  explicit FilmStudio(Surroundings around);
-  ~FilmStudio();  // ends the present job after its current part or row
-  FilmStudio(const FilmStudio&) = delete;
-  FilmStudio& operator=(const FilmStudio&) = delete;
+  /// Its end waits for that of the current part or row.
+  explicit FilmRenderer(Surroundings around)
+      : around_(std::move(around)), jobs_(around_.background) {}
 
   // Network thread. `id`: of a job.
   /// {"state", "share", "seconds_left", "bytes", "error"}
@@ -51,7 +47,7 @@ class FilmStudio {
   /// Returns a refusal unless the job waits or is being drawn.
   std::optional<HttpResponse> refuse_cancel(std::string_view id);
   HttpResponse cancel(std::string_view id);
-  /// Takes an order (film_wish.h); answers 202 with {"id": JOB}. The caller has checked that the
+  /// Takes an order (film_request.h); answers 202 with {"id": JOB}. The caller has checked that the
   /// sender may save the scene. `owner`: id of its token. One whose place is abandoned meanwhile
   /// orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
@@ -61,7 +57,6 @@ class FilmStudio {
   /// Nothing: there is no such job, or its link was revoked.
   std::optional<FilmReport> find(std::string_view id);
   HttpResponse take(std::string scene_id, std::string owner, const std::string& json);
-  void work(const std::stop_token& stop);
   void draw(const FilmJob& job, const std::stop_token& stop);
   /// Throws Cancelled when the server stops, or the job, of which `share` is done, was cancelled or
   /// its link revoked.
@@ -70,14 +65,10 @@ class FilmStudio {
   /// Throws NotDrawn, or as check().
   LeasedScene take_scene(const FilmJob& job, double share, std::optional<int> content,
                          const std::stop_token& stop);
-  LeasedScene ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop);
 
   const Surroundings around_;
   const std::shared_ptr<FilmQueue> queue_ = std::make_shared<FilmQueue>();
-  std::mutex mutex_;
-  std::condition_variable_any wake_;
-  std::jthread artist_;
-  boost::asio::thread_pool clerk_{1};  // orders are too long to be read on the network thread
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

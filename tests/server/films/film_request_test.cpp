@@ -1,4 +1,4 @@
-#include "server/films/film_wish.h"
+#include "server/films/film_request.h"
 
 #include <string>
 
@@ -22,31 +22,31 @@ std::string film(const std::string& views, const std::string& size = "[320, 180]
 
 std::string mistake(const std::string& json) {
   try {
-    parse_film_wish(json);
+    parse_film_request(json);
   } catch (const InputError& error) {
     return error.what();
   }
   return "";
 }
 
-TEST(FilmWish, RepeatsViewsAndKeepsTheFieldOfView) {
-  const FilmWish wish = parse_film_wish(film(view + ", 2, [4, 5, 6, 0, 0, 0, 1], 1"));
-  ASSERT_EQ(wish.views.size(), 5u);
-  EXPECT_EQ(wish.size_px, glm::ivec2(320, 180));
-  EXPECT_EQ(wish.views[2].world_from_camera.position, glm::vec3(1, 2, 3));
-  EXPECT_EQ(wish.views[4].world_from_camera.position, glm::vec3(4, 5, 6));
-  EXPECT_NEAR(wish.views[4].fov_y_rad, 1.0471976f, 1e-6f);
+TEST(FilmRequest, RepeatsViewsAndKeepsTheFieldOfView) {
+  const FilmRequest request = parse_film_request(film(view + ", 2, [4, 5, 6, 0, 0, 0, 1], 1"));
+  ASSERT_EQ(request.views.size(), 5u);
+  EXPECT_EQ(request.size_px, glm::ivec2(320, 180));
+  EXPECT_EQ(request.views[2].world_from_camera.position, glm::vec3(1, 2, 3));
+  EXPECT_EQ(request.views[4].world_from_camera.position, glm::vec3(4, 5, 6));
+  EXPECT_NEAR(request.views[4].fov_y_rad, 1.0471976f, 1e-6f);
 }
 
-TEST(FilmWish, LastsTenMinutesAtMost) {
-  EXPECT_EQ(parse_film_wish(film(view + ", 17999")).views.size(), most_film_frames);
+TEST(FilmRequest, LastsTenMinutesAtMost) {
+  EXPECT_EQ(parse_film_request(film(view + ", 17999")).views.size(), most_film_frames);
   EXPECT_THAT(mistake(film(view + ", 18000")), HasSubstr("views: has more than 18000 views"));
   EXPECT_THAT(mistake(film(view + ", 4294967295")), HasSubstr("views: has more than 18000"));
   EXPECT_THAT(mistake(film(view + ", 1", "[320, 180]", "picture")),
               HasSubstr("views: has more than 1 view ("));
 }
 
-TEST(FilmWish, HasASizeThatItsKindMayHave) {
+TEST(FilmRequest, HasASizeThatItsKindMayHave) {
   EXPECT_EQ(mistake(film(view, "[7680, 4320]", "picture")), "");
   EXPECT_EQ(mistake(film(view, "[8192, 4096]", "panorama")), "");
   EXPECT_THAT(mistake(film(view, "[7682, 4320]", "picture")), HasSubstr("between 16x16 and"));
@@ -57,7 +57,7 @@ TEST(FilmWish, HasASizeThatItsKindMayHave) {
   EXPECT_THAT(mistake(film(view, "[320]")), HasSubstr("size: is not width and height"));
 }
 
-TEST(FilmWish, NamesTheFieldThatIsWrong) {
+TEST(FilmRequest, NamesTheFieldThatIsWrong) {
   EXPECT_THAT(mistake("{ broken"), HasSubstr("film: byte "));
   EXPECT_THAT(mistake("7"), HasSubstr("is not an object"));
   EXPECT_THAT(mistake(film(view, "[320, 180]", "opera")), HasSubstr("kind: is no kind"));

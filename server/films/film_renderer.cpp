@@ -1,17 +1,15 @@
-#include "server/films/film_studio.h"
+#include "server/films/film_renderer.h"
 
 #include <array>
 #include <span>
 #include <utility>
 
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "server/base/log_event.h"
-#include "server/base/prompt_thread.h"
-#include "server/films/film_artist.h"
+#include "server/films/film_worker.h"
 
 namespace catgs {
 namespace {
@@ -19,11 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto longest_job = 2h;
-constexpr auto look_again = 20ms;
 constexpr auto ask_again = 250ms;  // for a scene
-
-/// Thrown by the artist's callback.
-struct Cancelled {};
 
 HttpResponse json_response(int status, const nlohmann::json& document) {
   return text_response(status,
@@ -37,16 +31,7 @@ HttpResponse no_such_job() {
 
 }  // namespace
 
-FilmStudio::FilmStudio(Surroundings around)
-    : around_(std::move(around)), artist_([this](const std::stop_token& stop) { work(stop); }) {}
-
-FilmStudio::~FilmStudio() {
-  artist_.request_stop();
-  clerk_.join();
-  artist_.join();
-}
-
-HttpResponse FilmStudio::result(std::string_view id) {
+HttpResponse FilmRenderer::result(std::string_view id) {
   const auto job = find(id);
   if (job && !has_ended(*job))
     return text_response(
@@ -63,7 +48,7 @@ HttpResponse FilmStudio::result(std::string_view id) {
   return response;
 }
 
-HttpResponse FilmStudio::report(std::string_view id) {
+HttpResponse FilmRenderer::report(std::string_view id) {
   const auto job = find(id);
   if (!job) return no_such_job();
   constexpr std::array names = {"waiting", "drawing", "done", "failed", "cancelled"};
@@ -75,45 +60,47 @@ HttpResponse FilmStudio::report(std::string_view id) {
   return json_response(200, report);
 }
 
-std::optional<FilmReport> FilmStudio::find(std::string_view id) {
+std::optional<FilmReport> FilmRenderer::find(std::string_view id) {
   auto job = queue_->find(id);
   return job && !around_.ended(job->owner) ? job : std::nullopt;
 }
 
-std::optional<HttpResponse> FilmStudio::refuse_cancel(std::string_view id) {
+std::optional<HttpResponse> FilmRenderer::refuse_cancel(std::string_view id) {
   const auto job = find(id);
   return job && !has_ended(*job) ? std::nullopt : std::optional(no_such_job());
 }
 
-HttpResponse FilmStudio::cancel(std::string_view id) {
+HttpResponse FilmRenderer::cancel(std::string_view id) {
   if (auto refusal = refuse_cancel(id)) return *std::move(refusal);
   return queue_->cancel(id) ? text_response(200, "cancelled\n") : no_such_job();
 }
 
-std::future<HttpResponse> FilmStudio::order(std::string scene_id, std::string owner,
-                                            std::string json,
-                                            std::shared_ptr<const UploadPlace> place) {
+std::future<HttpResponse> FilmRenderer::order(std::string scene_id, std::string owner,
+                                              std::string json,
+                                              std::shared_ptr<const UploadPlace> place) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
-  boost::asio::post(clerk_, [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
-                             json = std::move(json), place = std::move(place)]() mutable {
-    if (place->abandoned()) return;
-    HttpResponse response = take(std::move(scene_id), std::move(owner), json);
-    std::string().swap(json);
-    place.reset();  // it is free before the answer comes
-    answer->set_value(std::move(response));
-  });
+  // An order is too long to be read on the network thread.
+  jobs_.start(lanes::film_requests, Priority::normal,
+              [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
+               json = std::move(json), place = std::move(place)](const auto&) mutable {
+                if (place->abandoned()) return;
+                HttpResponse response = take(std::move(scene_id), std::move(owner), json);
+                std::string().swap(json);
+                place.reset();  // it is free before the answer comes
+                answer->set_value(std::move(response));
+              });
   return future;
 }
 
-HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std::string& json) {
-  FilmWish wish;
+HttpResponse FilmRenderer::take(std::string scene_id, std::string owner, const std::string& json) {
+  FilmRequest request;
   try {
-    wish = parse_film_wish(json);
+    request = parse_film_request(json);
   } catch (const InputError& mistake) {
     return text_response(400, fmt::format("400: {}\n", mistake.what()));
   }
-  const auto added = queue_->add(scene_id, std::move(owner), std::move(wish));
+  const auto added = queue_->add(scene_id, std::move(owner), std::move(request));
   if (const auto* refused = std::get_if<FilmQueue::Refused>(&added))
     return refused->has_one
                ? text_response(409, "409: you have ordered one already: wait for it or cancel it\n")
@@ -124,31 +111,18 @@ HttpResponse FilmStudio::take(std::string scene_id, std::string owner, const std
   boost::asio::post(around_.io, [queue = queue_, lease = around_.lease, scene_id, id] {
     if (const auto held = lease(scene_id, false).lease) queue->found_scene(id, held->content());
   });
-  {
-    const std::lock_guard lock(mutex_);  // so that the artist does not miss it
-  }
-  wake_.notify_all();
+  jobs_.start(lanes::films, Priority::normal, [this](const std::stop_token& stop) {
+    if (const auto job = queue_->start_next()) draw(*job, stop);
+  });
   return json_response(202, {{"id", id}});
 }
 
-void FilmStudio::work(const std::stop_token& stop) {
-  run_in_background();
-  while (!stop.stop_requested()) {
-    std::optional<FilmJob> job;
-    {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock, stop, [&] { return (job = queue_->start_next()).has_value(); });
-    }
-    if (job) draw(*job, stop);
-  }
-}
-
-void FilmStudio::check(const FilmJob& job, double share, const std::stop_token& stop) {
+void FilmRenderer::check(const FilmJob& job, double share, const std::stop_token& stop) {
   if (around_.ended(job.owner)) queue_->cancel(job.id);
   if (stop.stop_requested() || !queue_->drawn(job.id, share)) throw Cancelled();
 }
 
-void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
+void FilmRenderer::draw(const FilmJob& job, const std::stop_token& stop) {
   const TimePoint started = Clock::now();
   double done = 0.0;
   std::optional<int> content = job.content;
@@ -159,11 +133,10 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   };
   try {
     const auto file = std::make_shared<ResultFile>();
-    draw_film(job.wish, take, *file, [&](double share, Clock::duration took) {
+    draw_film(job.request, take, *file, [&](double share, Clock::duration took) {
       check(job, done = share, stop);
       if (Clock::now() - started > longest_job) throw NotDrawn("it takes longer than two hours");
-      std::unique_lock lock(mutex_);
-      if (around_.visitors_look()) wake_.wait_for(lock, stop, took, [] { return false; });
+      if (around_.visitors_look()) sleep_unless_stopped(took, stop);
     });
     queue_->finish(job.id, file);
   } catch (const Cancelled&) {
@@ -176,11 +149,12 @@ void FilmStudio::draw(const FilmJob& job, const std::stop_token& stop) {
   }
 }
 
-LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::optional<int> content,
-                                   const std::stop_token& stop) {
+LeasedScene FilmRenderer::take_scene(const FilmJob& job, double share, std::optional<int> content,
+                                     const std::stop_token& stop) {
   const TimePoint begun = Clock::now();
   while (true) {
-    const LeasedScene scene = ask_for_scene(job, content.has_value(), stop);
+    const LeasedScene scene = ask_session_thread(
+        around_.io, stop, [&] { return around_.lease(job.scene_id, content.has_value()); });
     if (scene.lease && content && scene.lease->content() != *content)
       throw NotDrawn("the scene's file has changed meanwhile: order again");
     if (scene.lease) return scene;
@@ -189,22 +163,9 @@ LeasedScene FilmStudio::take_scene(const FilmJob& job, double share, std::option
     if (Clock::now() - begun >= around_.longest_wait)
       throw NotDrawn(
           "visitors of other scenes need the memory of this one: order again when it is quieter");
-    std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, stop, ask_again, [] { return false; });
-    lock.unlock();
+    sleep_unless_stopped(ask_again, stop);
     check(job, share, stop);
   }
-}
-
-LeasedScene FilmStudio::ask_for_scene(const FilmJob& job, bool again, const std::stop_token& stop) {
-  auto answer = std::make_shared<std::promise<LeasedScene>>();
-  auto future = answer->get_future();
-  boost::asio::post(around_.io, [lease = around_.lease, id = job.scene_id, again, answer] {
-    answer->set_value(lease(id, again));
-  });
-  while (future.wait_for(look_again) != std::future_status::ready)
-    if (stop.stop_requested()) throw Cancelled();
-  return future.get();
 }
 
 }  // namespace catgs

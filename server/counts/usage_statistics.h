@@ -1,16 +1,14 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <filesystem>
 #include <mutex>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
+#include "server/base/background.h"
 #include "server/base/file_lock.h"
 #include "server/counts/visit_counts.h"
 
@@ -22,15 +20,18 @@ std::string counts_json(const DayCounts& day);
 DayCounts read_counts(const ByteSource& file);
 
 /// The counts of all days. A folder keeps them, in a file for each day:
-/// "visits-2026-11-25.json". What was counted is added to it once a minute and at the end, on a
-/// thread of its own. To forget a day, delete its file while no server runs.
-class VisitBook {
+/// "visits-2026-11-25.json". What was counted is added to it once a minute, in the background, and
+/// at the end. To forget a day, delete its file while no server runs.
+class UsageStatistics {
  public:
   /// `folder`: empty: counts stay in memory. It is made if needed, and belongs to this process as
-  /// long as the book exists. Files of days that are too long ago are deleted. No day is read.
-  /// Throws InputError where the folder cannot be used. `counts` outlives the book.
-  VisitBook(std::filesystem::path folder, VisitCounts& counts,
-            std::chrono::milliseconds save_interval = std::chrono::minutes(1));
+  /// long as the statistics exists. Files of days that are too long ago are deleted. No day is
+  /// read. Throws InputError where the folder cannot be used. `counts` outlives this object.
+  UsageStatistics(std::filesystem::path folder, VisitCounts& counts, Background& background,
+                  std::chrono::milliseconds save_interval = std::chrono::minutes(1));
+  ~UsageStatistics();
+  UsageStatistics(const UsageStatistics&) = delete;
+  UsageStatistics& operator=(const UsageStatistics&) = delete;
 
   /// The days that have counts, oldest first. Any thread. May block.
   [[nodiscard]] std::vector<std::string> dates() const;
@@ -51,9 +52,7 @@ class VisitBook {
   std::optional<FileLock> lock_;  // of the folder
   VisitCounts& counts_;
   mutable std::mutex files_mutex_;  // what is in a file is not in `counts_`
-  std::mutex mutex_;
-  std::condition_variable_any wake_;
-  std::jthread thread_;
+  Background::Jobs jobs_;
 };
 
 }  // namespace catgs

@@ -1,5 +1,5 @@
 // Scenes of a real library, and where people can walk in them.
-#include "server/scenes/scene_grounds.h"
+#include "server/scenes/walkable_areas.h"
 
 #include <atomic>
 #include <fstream>
@@ -26,7 +26,7 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-using Ground = std::shared_ptr<const SceneGround>;
+using Ground = std::shared_ptr<const WalkableArea>;
 using Entry = std::shared_ptr<const SceneEntry>;
 
 constexpr auto sidecar =
@@ -41,7 +41,7 @@ walk::WalkMap map_in(const std::string& bytes) {
   return walk::read_walk_file(MemorySource("served", std::as_bytes(std::span(bytes))));
 }
 
-class SceneGroundsTest : public FolderTest {
+class WalkableAreasTest : public FolderTest {
  protected:
   void SetUp() override {
     fs::create_directory(folder_ / "scenes");
@@ -55,8 +55,8 @@ class SceneGroundsTest : public FolderTest {
     library_.reset();  // which takes the cache with it
     io_.emplace();     // and what the library has asked of it
     library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, *io_,
-        metrics_, [this] { return now_; });
+        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
+        *io_, metrics_, [this] { return now_; });
   }
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 120'000 && !holds(); ++i) {
@@ -74,12 +74,12 @@ class SceneGroundsTest : public FolderTest {
   }
   Ground listed() const {
     const auto listing = library_->listing();
-    return std::ranges::find(*listing, id(), &SceneLibrary::Listing::id)->ground;
+    return std::ranges::find(*listing, id(), &SceneLibrary::Listing::id)->walkable_area;
   }
   /// As a page does that asks again and again.
   Ground found() {
     run_until([&] {
-      library_->want_ground(id());
+      library_->want_walkable_area(id());
       return listed() != nullptr;
     });
     return listed();
@@ -91,6 +91,7 @@ class SceneGroundsTest : public FolderTest {
     return files;
   }
 
+  Background background_;
   std::optional<boost::asio::io_context> io_;
   Metrics metrics_;
   ServerConfig config_;
@@ -98,22 +99,22 @@ class SceneGroundsTest : public FolderTest {
   TimePoint now_ = TimePoint{} + 1h;
 };
 
-TEST_F(SceneGroundsTest, AScenesGroundIsFoundWhenAPageAsks) {
+TEST_F(WalkableAreasTest, AScenesGroundIsFoundWhenAPageAsks) {
   start();
-  library_->want_ground(id());  // not in memory
+  library_->want_walkable_area(id());  // not in memory
   const Entry seen = load();
   EXPECT_EQ(listed(), nullptr);
-  const Ground ground = found();
-  ASSERT_NE(ground->file, nullptr);
-  EXPECT_EQ(ground->etag, etag_of(*ground->file));
-  const walk::WalkMap map = map_in(*ground->file);
+  const Ground walkable_area = found();
+  ASSERT_NE(walkable_area->file, nullptr);
+  EXPECT_EQ(walkable_area->etag, etag_of(*walkable_area->file));
+  const walk::WalkMap map = map_in(*walkable_area->file);
   EXPECT_FLOAT_EQ(map.grid.cell, 0.1f);
   EXPECT_TRUE(walk::stand_below(map, {6, 3, 2}));
   ASSERT_EQ(kept().size(), 1u);
-  EXPECT_EQ(bytes_in(kept()[0]), *ground->file);
+  EXPECT_EQ(bytes_in(kept()[0]), *walkable_area->file);
 }
 
-TEST_F(SceneGroundsTest, TheNextStartReadsWhatWasFound) {
+TEST_F(WalkableAreasTest, TheNextStartReadsWhatWasFound) {
   start();
   load();
   found();
@@ -131,7 +132,7 @@ TEST_F(SceneGroundsTest, TheNextStartReadsWhatWasFound) {
   EXPECT_EQ(bytes_in(kept().at(0)), *listed()->file);
 }
 
-TEST_F(SceneGroundsTest, APipeInPlaceOfAFileIsReplaced) {
+TEST_F(WalkableAreasTest, APipeInPlaceOfAFileIsReplaced) {
   start();
   load();
   found();
@@ -143,43 +144,12 @@ TEST_F(SceneGroundsTest, APipeInPlaceOfAFileIsReplaced) {
   ASSERT_EQ(::mkfifo((folder_ / "scenes/a.walk").c_str(), 0600), 0);  // in place of the author's
   start();
   load();
-  const Ground ground = found();
+  const Ground walkable_area = found();
   ASSERT_TRUE(fs::is_regular_file(file));
-  EXPECT_EQ(bytes_in(file), *ground->file);
+  EXPECT_EQ(bytes_in(file), *walkable_area->file);
 }
 
-TEST_F(SceneGroundsTest, OfManyThoseThatWereUsedLastStay) {
-  start();
-  constexpr int others = 300;
-  for (int i = 0; i < others; ++i) {
-    const fs::path file = write(fmt::format("cache/{}.walk", i), "");
-    fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(others - i));
-  }
-  load();
-  found();
-  EXPECT_EQ(kept().size(), SceneGrounds::max_kept);
-  constexpr int gone = others + 1 - static_cast<int>(SceneGrounds::max_kept);
-  EXPECT_FALSE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone - 1)));
-  EXPECT_TRUE(fs::exists(folder_ / fmt::format("cache/{}.walk", gone)));
-}
-
-TEST_F(SceneGroundsTest, SavesOfOneSceneDropNoFilesOfOthers) {
-  save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
-  start();
-  const fs::path other = write("cache/other.walk", "");
-  fs::last_write_time(other, fs::file_time_type::clock::now() - std::chrono::hours(1));
-  auto saved = std::make_shared<SceneEntry>(*load());
-  for (std::size_t i = 0; i < 2 * SceneGrounds::max_kept_of_scene; ++i) {
-    saved = std::make_shared<SceneEntry>(*saved);
-    saved->facts.about.metres_per_unit = 1.0f + static_cast<float>(i);
-    library_->revise(id(), saved);
-    found();
-  }
-  EXPECT_EQ(kept().size(), SceneGrounds::max_kept_of_scene + 1);
-  EXPECT_TRUE(fs::exists(other));
-}
-
-TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
+TEST_F(WalkableAreasTest, TheAuthorsFileComesFirst) {
   const std::string own = walk::pack(map_of(stairs(), {0, 3, 1.6f}));
   write("scenes/a.walk", own);
   start();
@@ -188,7 +158,7 @@ TEST_F(SceneGroundsTest, TheAuthorsFileComesFirst) {
   EXPECT_TRUE(kept().empty());
 }
 
-TEST_F(SceneGroundsTest, ABadFileOfTheAuthorsIsNoHarm) {
+TEST_F(WalkableAreasTest, ABadFileOfTheAuthorsIsNoHarm) {
   for (const std::string& bad : {std::string("no walk file"), std::string()}) {
     write("scenes/a.walk", bad);
     start();
@@ -197,7 +167,7 @@ TEST_F(SceneGroundsTest, ABadFileOfTheAuthorsIsNoHarm) {
   }
 }
 
-TEST_F(SceneGroundsTest, ASceneWithoutGroundIsLookedThroughOnce) {
+TEST_F(WalkableAreasTest, ASceneWithoutGroundIsLookedThroughOnce) {
   save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
   start();
   load();
@@ -209,21 +179,21 @@ TEST_F(SceneGroundsTest, ASceneWithoutGroundIsLookedThroughOnce) {
   EXPECT_EQ(found()->file, nullptr);
 }
 
-TEST_F(SceneGroundsTest, WithoutAFolderItStaysWhileTheSceneDoes) {
+TEST_F(WalkableAreasTest, WithoutAFolderItStaysWhileTheSceneDoes) {
   config_.cache_dir.clear();
   start();
   load();
   EXPECT_NE(found()->file, nullptr);
 }
 
-TEST_F(SceneGroundsTest, AnotherStartHasAnotherGround) {
+TEST_F(WalkableAreasTest, AnotherStartHasAnotherGround) {
   start();
   const Entry seen = load();
   const Ground before = found();
   auto turned = std::make_shared<SceneEntry>(*seen);
   turned->facts.about.title = "Another title";
   library_->revise(id(), turned);
-  EXPECT_EQ(listed(), before) << "the ground stays where a title changes";
+  EXPECT_EQ(listed(), before) << "the walkable area stays where a title changes";
   turned = std::make_shared<SceneEntry>(*turned);
   turned->facts.about.metres_per_unit = 2.0f;
   library_->revise(id(), turned);
@@ -232,7 +202,7 @@ TEST_F(SceneGroundsTest, AnotherStartHasAnotherGround) {
   EXPECT_EQ(kept().size(), 2u);
 }
 
-TEST_F(SceneGroundsTest, AChangedSceneGetsItsOwnGround) {
+TEST_F(WalkableAreasTest, AChangedSceneGetsItsOwnGround) {
   start();
   Entry seen = load();
   found();
@@ -247,21 +217,21 @@ TEST_F(SceneGroundsTest, AChangedSceneGetsItsOwnGround) {
   EXPECT_EQ(kept().size(), 2u);
 }
 
-TEST_F(SceneGroundsTest, ATreeIsReadPartByPart) {
+TEST_F(WalkableAreasTest, ATreeIsReadPartByPart) {
   config_.gaussians_of_a_tree = 1000;
   start();
   load();
   run_until([&] { return library_->in_memory(id())->in_pages; });
-  const Ground ground = found();
-  ASSERT_NE(ground->file, nullptr);
-  EXPECT_TRUE(walk::stand_below(map_in(*ground->file), {6, 3, 2}));
+  const Ground walkable_area = found();
+  ASSERT_NE(walkable_area->file, nullptr);
+  EXPECT_TRUE(walk::stand_below(map_in(*walkable_area->file), {6, 3, 2}));
 }
 
-TEST_F(SceneGroundsTest, AFailureThatPassesIsNoAnswer) {
+TEST_F(WalkableAreasTest, AFailureThatPassesIsNoAnswer) {
   start();
   const Entry seen = load();
   fs::rename(folder_ / "scenes/a.ply", folder_ / "scenes/a.away");
-  const auto ask = [&] { library_->want_ground(id()); };
+  const auto ask = [&] { library_->want_walkable_area(id()); };
   for (int i = 0; i < 300; ++i) {
     ask();
     io_->restart();
@@ -281,51 +251,51 @@ TEST_F(SceneGroundsTest, AFailureThatPassesIsNoAnswer) {
   EXPECT_NE(listed()->file, nullptr);
 }
 
-TEST_F(SceneGroundsTest, TheLibraryEndsWhileAGroundIsSought) {
+TEST_F(WalkableAreasTest, TheLibraryEndsWhileAGroundIsSought) {
   start();
   load();
-  library_->want_ground(id());
+  library_->want_walkable_area(id());
   io_->poll();
   library_.reset();
 }
 
 /// Its header tells how large it is.
-TEST(GroundOfScene, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
+TEST(ComputedWalkableArea, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
   const TemporaryFolder folder;
   const auto error = [&](int gaussians) {
-    GroundSource source;
+    WalkableAreaSource source;
     source.scene =
         locate_scene(folder.write("a.ply", fmt::format("ply\nformat ascii 1.0\nelement vertex {}\n"
                                                        "property float x\nend_header\n",
                                                        gaussians)));
-    return input_error([&] { compute_ground(source, 2, [] {}); });
+    return input_error([&] { compute_walkable_area(source, 2, [] {}); });
   };
   EXPECT_THAT(error(4'000'001), ::testing::HasSubstr("--cache-dir"));
   EXPECT_THAT(error(4'000'000), ::testing::Not(::testing::HasSubstr("--cache-dir")));
 }
 
-/// The public demo: its ground is found without its file.
-TEST(GroundOfScene, OfAProceduralScene) {
-  GroundSource source;
+/// The public demo: its walkable area is found without its file.
+TEST(ComputedWalkableArea, OfAProceduralScene) {
+  WalkableAreaSource source;
   source.scene.given = "synth:stress:100000";
   source.start = {0, -1.6f, -5};
   source.up = {0, -1, 0};
   source.metres_per_unit = 1.0f;
   std::atomic<int> calls = 0;
-  const std::string bytes = compute_ground(source, 2, [&] { ++calls; });
+  const std::string bytes = compute_walkable_area(source, 2, [&] { ++calls; });
   EXPECT_GT(map_in(bytes).places.size(), 1000u);
   struct Stop {};
   for (const int last : {1, calls / 2, calls - 1}) {
     std::atomic<int> left = last;
-    EXPECT_THROW(compute_ground(source, 2,
-                                [&] {
-                                  if (--left == 0) throw Stop();
-                                }),
+    EXPECT_THROW(compute_walkable_area(source, 2,
+                                       [&] {
+                                         if (--left == 0) throw Stop();
+                                       }),
                  Stop)
         << last;
   }
   source.start = {0, -1e5f, 0};
-  EXPECT_THROW(compute_ground(source, 2, [] {}), NoGround);
+  EXPECT_THROW(compute_walkable_area(source, 2, [] {}), NoWalkableArea);
 }
 
 }  // namespace

@@ -15,8 +15,8 @@
 #include "server/base/page_metrics.h"
 #include "server/scenes/scene_entry.h"
 #include "server/scenes/scene_folder.h"
-#include "server/scenes/scene_grounds.h"
 #include "server/scenes/scene_lease.h"
+#include "server/scenes/walkable_areas.h"
 
 namespace catgs {
 
@@ -31,18 +31,18 @@ struct SceneListing {
   std::optional<ToursAnswers> tours{};          // of a loaded one
   std::filesystem::path sidecar{};              // of a loaded one; empty: it is no file
   std::shared_ptr<const std::string> poster{};  // of one that has been loaded; a JPEG file
-  std::shared_ptr<const SceneGround> ground{};  // of a loaded one; null: not known yet
+  std::shared_ptr<const WalkableArea> walkable_area{};  // of a loaded one; null: not known yet
 };
 
 /// What the server knows of a scene that it offers.
-struct SceneBook {
+struct SceneRecord {
   FoundScene found;  // of procedural scenes, only location.given, name and size are set
   std::shared_ptr<const SceneEntry> entry;      // while in memory
   std::shared_ptr<const SceneEntry> former{};   // drawn before `entry`; while visitors still see it
   std::shared_ptr<const std::string> poster{};  // stays when the entry goes
   bool poster_tried = false;                    // for this content of the file
-  std::shared_ptr<const SceneGround> ground{};  // of the entry; null: not known yet
-  std::optional<TimePoint> ground_retry_at{};   // after a failure to find it
+  std::shared_ptr<const WalkableArea> walkable_area{};  // of the entry; null: not known yet
+  std::optional<TimePoint> walkable_area_retry_at{};    // after a failure to find it
   bool pinned = false;
   bool outdated = false;                // the file has changed since
   bool tree_lost = false;               // the entry reads a tree with damage: another is built
@@ -55,7 +55,7 @@ struct SceneBook {
   /// Scenes come into use on the session thread only, so an unused scene stays unused. Uses may end
   /// elsewhere without harm.
   [[nodiscard]] SceneUse use() const;
-  /// True if only the shelf holds the former entry.
+  /// True if only the index holds the former entry.
   [[nodiscard]] bool former_is_left() const { return former && !held(former, 0); }
   /// A background job's hold on the entry.
   [[nodiscard]] LeasedScene lease() const {
@@ -65,7 +65,7 @@ struct SceneBook {
   void recall() const { ++leases->recalls; }
 
  private:
-  /// True if a user besides the shelf and so many leases holds the scene.
+  /// True if a user besides the index and so many leases holds the scene.
   static bool held(const std::shared_ptr<const SceneEntry>& entry, int leases) {
     return entry && (entry.use_count() > 1 || entry->renderer.use_count() > 1 + leases);
   }
@@ -73,17 +73,17 @@ struct SceneBook {
 
 /// The scenes that a server offers, by id and by name, and their listing. All functions run on the
 /// session thread unless marked.
-class SceneShelf {
+class SceneIndex {
  public:
-  using Books = std::map<std::string, SceneBook>;
-  [[nodiscard]] Books& books() { return books_; }
-  [[nodiscard]] const Books& books() const { return books_; }
+  using Records = std::map<std::string, SceneRecord>;
+  [[nodiscard]] Records& records() { return records_; }
+  [[nodiscard]] const Records& records() const { return records_; }
   /// Null: there is none.
-  [[nodiscard]] SceneBook* find(const std::string& id);
-  /// Returns the book with this id and creates it if needed.
-  SceneBook& book_of(const std::string& id);
-  /// Takes over the result of a scan. Books of scenes that are gone are removed, unless they are in
-  /// memory or `awaited`.
+  [[nodiscard]] SceneRecord* find(const std::string& id);
+  /// Returns the record with this id and creates it if needed.
+  SceneRecord& record_of(const std::string& id);
+  /// Takes over the result of a scan. Records of scenes that are gone are removed, unless they are
+  /// in memory or `awaited`.
   void merge(std::vector<FoundScene> found,
              const std::function<bool(const std::string& id)>& awaited);
 
@@ -92,10 +92,10 @@ class SceneShelf {
   [[nodiscard]] const std::string& preferred() const { return preferred_; }
   [[nodiscard]] std::string default_scene() const;
   [[nodiscard]] std::vector<std::string> scene_ids() const;
-  /// Any thread. Returns the id of the only scene with this name, or else the wish itself. If two
+  /// Any thread. Returns the id of the only scene with this name, or else the name itself. If two
   /// paths have had the name since the start, it stands for neither, because a link by name does
   /// not tell them apart.
-  [[nodiscard]] std::string resolve(std::string_view wish) const;
+  [[nodiscard]] std::string resolve(std::string_view name) const;
 
   /// The pages of trees that are in memory.
   [[nodiscard]] std::vector<ScenePages> pages() const;
@@ -105,7 +105,7 @@ class SceneShelf {
   [[nodiscard]] std::shared_ptr<const std::vector<SceneListing>> listing() const;
 
  private:
-  Books books_;
+  Records records_;
   std::string preferred_;
   mutable std::mutex published_mutex_;  // guards the next two
   std::shared_ptr<const std::vector<SceneListing>> published_;

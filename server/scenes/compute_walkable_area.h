@@ -12,8 +12,8 @@
 
 namespace catgs {
 
-/// All that the ground of a scene depends on.
-struct GroundSource {
+/// All that the walkable area of a scene depends on.
+struct WalkableAreaSource {
   SceneLocation scene;
   std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
   LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
@@ -21,26 +21,25 @@ struct GroundSource {
   glm::vec3 start, up;           // of the scene as it is shown
   float metres_per_unit = 0.0f;  // 0: not said
 };
-GroundSource ground_source(const SceneLocation& scene, const SceneFacts& facts);
-/// True if both have the same ground as long as the scene's files are the same.
-bool same_ground(const GroundSource& one, const GroundSource& other);
+WalkableAreaSource walkable_area_source(const SceneLocation& scene, const SceneFacts& facts);
+/// True if both have the same walkable area as long as the scene's files are the same.
+bool same_walkable_area(const WalkableAreaSource& one, const WalkableAreaSource& other);
 
 /// Nobody can walk in the scene.
-struct NoGround : InputError {
-  explicit NoGround(const InputError& why) : InputError(why) {}
+struct NoWalkableArea : InputError {
+  explicit NoWalkableArea(const InputError& why) : InputError(why) {}
 };
 
 /// The bytes of a .walk file of the scene, for people of 1.6 m. Where the scene has no unit, the
 /// room around the start tells their size. Takes up to 1.4 GB for cells and 0.5 GB for what is
 /// found, beside the scene: that is read part by part where its format allows it, and else as a
 /// whole, with 4 M Gaussians at most. `progress` is called often, by several threads at a time, and
-/// may throw to cancel. Throws NoGround, or InputError where the scene cannot be read.
-std::string compute_ground(const GroundSource& source, int threads,
-                           const std::function<void()>& progress);
+/// may throw to cancel. Throws NoWalkableArea, or InputError where the scene cannot be read.
+std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
+                                  const std::function<void()>& progress);
 
-/// A name for that: it changes with the scene's files and with what else `source` says. It begins
-/// with digits that all names of one scene have in common. Throws InputError.
-std::string ground_name(const GroundSource& source);
-inline constexpr std::size_t ground_scene_digits = 16;
+/// See derived_name(): it changes with the scene's files and with what else `source` says. Throws
+/// InputError.
+std::string walkable_area_name(const WalkableAreaSource& source);
 
 }  // namespace catgs

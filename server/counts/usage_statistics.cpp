@@ -1,4 +1,4 @@
-#include "server/counts/visit_book.h"
+#include "server/counts/usage_statistics.h"
 
 #include <algorithm>
 #include <exception>
@@ -79,25 +79,29 @@ DayCounts read_counts(const ByteSource& file) {
   return day;
 }
 
-VisitBook::VisitBook(fs::path folder, VisitCounts& counts, std::chrono::milliseconds save_interval)
-    : folder_(std::move(folder)), counts_(counts) {
+UsageStatistics::UsageStatistics(fs::path folder, VisitCounts& counts, Background& background,
+                                 std::chrono::milliseconds save_interval)
+    : folder_(std::move(folder)), counts_(counts), jobs_(background) {
   if (folder_.empty()) return;
   lock_.emplace(own_folder("--visit-counts", folder_, "visits.lock"));
   drop_old_days();
-  thread_ = std::jthread([this, save_interval](const std::stop_token& stop) {
-    std::unique_lock lock(mutex_);
-    do {
-      wake_.wait_for(lock, stop, save_interval, [] { return false; });
-      save();
-    } while (!stop.stop_requested());
-  });
+  jobs_.start(lanes::visit_counts, Priority::normal,
+              [this, save_interval, waited = false](const std::stop_token&) mutable {
+                if (std::exchange(waited, true)) save();
+                return std::optional<Clock::duration>(save_interval);
+              });
 }
 
-fs::path VisitBook::file_of(const std::string& date) const {
+UsageStatistics::~UsageStatistics() {
+  jobs_.end();
+  if (!folder_.empty()) save();
+}
+
+fs::path UsageStatistics::file_of(const std::string& date) const {
   return folder_ / (std::string(prefix) + date + std::string(extension));
 }
 
-std::vector<std::string> VisitBook::saved_dates() const {
+std::vector<std::string> UsageStatistics::saved_dates() const {
   std::vector<std::string> dates;
   std::error_code error;
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
@@ -107,14 +111,14 @@ std::vector<std::string> VisitBook::saved_dates() const {
   return dates;
 }
 
-void VisitBook::drop_old_days() const {
+void UsageStatistics::drop_old_days() const {
   const std::vector<std::string> dates = saved_dates();
   std::error_code error;
   for (std::size_t i = 0; i + VisitCounts::most_days < dates.size(); ++i)
     fs::remove(file_of(dates[i]), error);
 }
 
-std::vector<std::string> VisitBook::dates() const {
+std::vector<std::string> UsageStatistics::dates() const {
   const std::lock_guard lock(files_mutex_);
   std::vector<std::string> dates = counts_.dates();
   if (folder_.empty()) return dates;
@@ -125,7 +129,7 @@ std::vector<std::string> VisitBook::dates() const {
   return dates;
 }
 
-DayCounts VisitBook::day(const std::string& date) const {
+DayCounts UsageStatistics::day(const std::string& date) const {
   if (folder_.empty()) return counts_.day(date);
   const std::lock_guard lock(files_mutex_);
   DayCounts day = saved(date);
@@ -133,7 +137,7 @@ DayCounts VisitBook::day(const std::string& date) const {
   return day;
 }
 
-DayCounts VisitBook::saved(const std::string& date) const {
+DayCounts UsageStatistics::saved(const std::string& date) const {
   const fs::path file = file_of(date);
   std::error_code error;
   const fs::file_type type = fs::symlink_status(file, error).type();
@@ -148,7 +152,7 @@ DayCounts VisitBook::saved(const std::string& date) const {
   }
 }
 
-void VisitBook::save() {
+void UsageStatistics::save() {
   for (const std::string& date : counts_.dates()) {
     const std::lock_guard lock(files_mutex_);
     save(date);
@@ -156,7 +160,7 @@ void VisitBook::save() {
 }
 
 /// Counts that cannot be written wait for the next time.
-void VisitBook::save(const std::string& date) {
+void UsageStatistics::save(const std::string& date) {
   std::error_code error;
   const bool is_new = !fs::exists(file_of(date), error);
   const DayCounts fresh = counts_.take(date);

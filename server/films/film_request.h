@@ -18,7 +18,7 @@ struct FilmView {
 };
 
 /// A picture or a film that an author wants of a scene.
-struct FilmWish {
+struct FilmRequest {
   FilmKind kind = FilmKind::picture;
   glm::ivec2 size_px{0};
   std::vector<FilmView> views;  // one, or one for each frame of a film
@@ -32,6 +32,6 @@ inline constexpr std::size_t most_film_frames = 18'000;  // ten minutes
 /// view repeats the view before so many times. Sizes: a picture at most 7680x4320, a panorama 2:1
 /// and at most 8192x4096, a film even and at most 1920x1080. Throws InputError that names the
 /// field.
-FilmWish parse_film_wish(std::string_view json);
+FilmRequest parse_film_request(std::string_view json);
 
 }  // namespace catgs

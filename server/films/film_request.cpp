@@ -1,4 +1,4 @@
-#include "server/films/film_wish.h"
+#include "server/films/film_request.h"
 
 #include <array>
 #include <span>
@@ -69,34 +69,34 @@ FilmView read_view(const JsonField& field, const FilmView* before) {
 
 }  // namespace
 
-FilmWish parse_film_wish(std::string_view json) {
+FilmRequest parse_film_request(std::string_view json) {
   const MemorySource source("film", std::as_bytes(std::span(json)));
   const nlohmann::json document = read_json(source, max_upload_bytes);
   const JsonField root(source.name(), document);
-  FilmWish wish;
-  wish.kind = read_kind(root.at("kind"));
-  wish.size_px = read_size(root.at("size"), wish.kind);
+  FilmRequest request;
+  request.kind = read_kind(root.at("kind"));
+  request.size_px = read_size(root.at("size"), request.kind);
   const JsonField views = root.at("views");
-  const std::size_t most = wish.kind == FilmKind::film ? most_film_frames : 1;
+  const std::size_t most = request.kind == FilmKind::film ? most_film_frames : 1;
   const auto check_count = [&](std::size_t more) {
-    if (more > most - wish.views.size())
+    if (more > most - request.views.size())
       views.fail(fmt::format("has more than {} view{}", most, most > 1 ? "s" : ""),
                  most > 1 ? "a film lasts ten minutes at most" : "only a film has several");
   };
   for (std::size_t i = 0; i < views.size(); ++i) {
     const JsonField entry = views[i];
-    const FilmView* const before = wish.views.empty() ? nullptr : &wish.views.back();
+    const FilmView* const before = request.views.empty() ? nullptr : &request.views.back();
     if (before && entry.value().is_number()) {
       const std::uint64_t times = entry.count();
       check_count(times);
-      wish.views.insert(wish.views.end(), times, FilmView(*before));
+      request.views.insert(request.views.end(), times, FilmView(*before));
     } else {
       check_count(1);
-      wish.views.push_back(read_view(entry, before));
+      request.views.push_back(read_view(entry, before));
     }
   }
-  if (wish.views.empty()) views.fail("is empty", "give at least one view");
-  return wish;
+  if (request.views.empty()) views.fail("is empty", "give at least one view");
+  return request;
 }
 
 }  // namespace catgs

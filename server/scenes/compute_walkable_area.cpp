@@ -1,14 +1,12 @@
-#include "server/scenes/ground_of_scene.h"
+#include "server/scenes/compute_walkable_area.h"
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
@@ -16,19 +14,18 @@
 #include "render_core/walk/eye_height.h"
 #include "render_core/walk/walk_file.h"
 #include "render_core/walk/walkable_area.h"
-#include "server/access/signed_token.h"
+#include "server/scenes/derived_files.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_ids.h"
-#include "server/scenes/tree_cache.h"
 
 namespace catgs {
 namespace {
 
 constexpr std::uint64_t most_whole_gaussians = 4'000'000;  // of a scene that is read as a whole
 
-std::string spec_of(const GroundSource& source) { return source.scene.given.string(); }
+std::string spec_of(const WalkableAreaSource& source) { return source.scene.given.string(); }
 
-SceneByParts open(const GroundSource& source, const std::shared_ptr<ThreadPool>& pool,
+SceneByParts open(const WalkableAreaSource& source, const std::shared_ptr<ThreadPool>& pool,
                   const std::function<void()>& progress) {
   LoadOptions options;
   options.threads = pool->threads();
@@ -51,7 +48,7 @@ SceneByParts open(const GroundSource& source, const std::shared_ptr<ThreadPool>&
   return by_parts(load_scene(scene, options));
 }
 
-SceneHints hints_of(const GroundSource& source) {
+SceneHints hints_of(const WalkableAreaSource& source) {
   SceneHints hints;
   hints.start_pose.position = source.start;
   hints.up = source.up;
@@ -59,17 +56,17 @@ SceneHints hints_of(const GroundSource& source) {
   return hints;
 }
 
-/// A mistake in the scene itself does not pass, so it means that there is no ground.
+/// A mistake in the scene itself does not pass, so it means that there is no walkable area.
 template <class Body>
 auto known_of_scene(const Body& body) {
   try {
     return body();
   } catch (const InputError& error) {
-    throw NoGround(error);
+    throw NoWalkableArea(error);
   }
 }
 
-float eye_height_of(const GroundSource& source, const GaussianCloud& sample) {
+float eye_height_of(const WalkableAreaSource& source, const GaussianCloud& sample) {
   if (const auto height = walk::eye_height_of(sample, hints_of(source))) return *height;
   throw InputError(spec_of(source), "", "has no floor and ceiling that tell how large people are",
                    "its sidecar can name metres_per_unit");
@@ -77,8 +74,8 @@ float eye_height_of(const GroundSource& source, const GaussianCloud& sample) {
 
 }  // namespace
 
-GroundSource ground_source(const SceneLocation& scene, const SceneFacts& facts) {
-  GroundSource source;
+WalkableAreaSource walkable_area_source(const SceneLocation& scene, const SceneFacts& facts) {
+  WalkableAreaSource source;
   source.scene = scene;
   source.start = facts.start_pose.position;
   source.up = facts.up;
@@ -86,13 +83,13 @@ GroundSource ground_source(const SceneLocation& scene, const SceneFacts& facts) 
   return source;
 }
 
-bool same_ground(const GroundSource& one, const GroundSource& other) {
+bool same_walkable_area(const WalkableAreaSource& one, const WalkableAreaSource& other) {
   return one.scene.given == other.scene.given && one.start == other.start && one.up == other.up &&
          one.metres_per_unit == other.metres_per_unit;
 }
 
-std::string compute_ground(const GroundSource& source, int threads,
-                           const std::function<void()>& progress) {
+std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
+                                  const std::function<void()>& progress) {
   constexpr std::size_t most_blocks = std::size_t{1} << 21;
   const auto pool = std::make_shared<ThreadPool>(threads);
   std::optional<walk::Occupancy> occupancy;
@@ -116,18 +113,14 @@ std::string compute_ground(const GroundSource& source, int threads,
   }));
 }
 
-std::string ground_name(const GroundSource& source) {
+std::string walkable_area_name(const WalkableAreaSource& source) {
   constexpr int version = 1;  // of what is found in a scene
-  const std::string spec = spec_of(source);
-  const std::string scene = is_synthetic(spec) ? spec : tree_name(source.scene, source.levels);
-  const TokenDigest digest = digest_of(fmt::format(
-      "{}\n{} {} {}\n{} {} {}\n{} {}", scene, source.start.x, source.start.y, source.start.z,
-      source.up.x, source.up.y, source.up.z, source.metres_per_unit, version));
-  constexpr std::size_t digest_bytes = 16;
-  const TokenDigest of_scene = digest_of(spec);
-  return fmt::format("{:02x}-{:02x}.walk",
-                     fmt::join(std::span(of_scene).first(ground_scene_digits / 2), ""),
-                     fmt::join(std::span(digest).first(digest_bytes), ""));
+  const SceneLocation& scene = source.scene;
+  const std::string files = is_synthetic(spec_of(source)) ? "" : tree_name(scene, source.levels);
+  const std::string facts = fmt::format("{}\n{} {} {}\n{} {} {}\n{} {}", files, source.start.x,
+                                        source.start.y, source.start.z, source.up.x, source.up.y,
+                                        source.up.z, source.metres_per_unit, version);
+  return derived_name(scene, facts, ".walk");
 }
 
 }  // namespace catgs

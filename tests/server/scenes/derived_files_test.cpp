@@ -1,7 +1,8 @@
-#include "server/scenes/tree_cache.h"
+#include "server/scenes/derived_files.h"
 
 #include <chrono>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/scene/files/save_scene.h"
@@ -17,7 +18,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 
-class TreeCacheTest : public FolderTest {
+class DerivedFilesTest : public FolderTest {
  protected:
   std::string name_of(const std::string& scene, const LoadOptions& levels = {}) {
     return tree_name(locate_scene(folder_ / scene), levels);
@@ -30,7 +31,7 @@ class TreeCacheTest : public FolderTest {
   const fs::path trees_ = folder_ / "trees";
 };
 
-TEST_F(TreeCacheTest, NamesFollowTheContentOfAScene) {
+TEST_F(DerivedFilesTest, NamesFollowTheContentOfAScene) {
   save_scene(random_cloud(10, 0), folder_ / "a hall.ply");
   const std::string name = name_of("a hall.ply");
   EXPECT_THAT(name, MatchesRegex("a-hall-[0-9a-f]+-[0-9a-f]+\\.tree"));
@@ -47,7 +48,7 @@ TEST_F(TreeCacheTest, NamesFollowTheContentOfAScene) {
   EXPECT_NE(name_of("a hall.ply"), name) << "another time";
 }
 
-TEST_F(TreeCacheTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
+TEST_F(DerivedFilesTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
   for (const auto& [file, content] : encode_sog(random_cloud(40, 0), 2))
     write("sog/" + file, content);
   const std::string name = name_of("sog");
@@ -57,7 +58,7 @@ TEST_F(TreeCacheTest, NamesFollowAllFilesOfAFolderButItsSidecar) {
   EXPECT_NE(name_of("sog"), name);
 }
 
-TEST_F(TreeCacheTest, NamesFollowTheDataBesideAGltfAndAllTilesets) {
+TEST_F(DerivedFilesTest, NamesFollowTheDataBesideAGltfAndAllTilesets) {
   GltfParts parts = encode_gltf(random_cloud(10, 0));
   parts.json["buffers"][0]["uri"] = "a.bin";
   write("a.gltf", parts.json.dump());
@@ -75,53 +76,56 @@ TEST_F(TreeCacheTest, NamesFollowTheDataBesideAGltfAndAllTilesets) {
   EXPECT_NE(name_of("tiles"), tiles);
 }
 
-TEST_F(TreeCacheTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
+TEST_F(DerivedFilesTest, RemovesWhatKilledBuildsHaveLeftAndNothingElse) {
   const std::string whole = "hall-3f0c91d2-9b1deb4d3b7d4bad.tree";
   tree(whole);
   tree(whole + ".part");
   tree(whole + ".x9Yb2c");
   const std::string new_file = "." + whole + ".3f0c91d29b1deb4d.new";
   tree(new_file);
+  const std::string former = "0123456789abcdef-0123456789abcdef0123456789abcdef.walk";
+  tree(former);
   for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
-                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"})
+                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "a.walk", "notes"})
     tree(other);
-  const TreeCache cache(trees_);
+  const DerivedFiles cache(trees_);
   EXPECT_TRUE(cache.contains(whole));
   EXPECT_TRUE(fs::exists(trees_ / whole));
   EXPECT_FALSE(fs::exists(trees_ / (whole + ".part")));
   EXPECT_FALSE(fs::exists(trees_ / (whole + ".x9Yb2c")));
   EXPECT_FALSE(fs::exists(trees_ / new_file));
+  EXPECT_FALSE(fs::exists(trees_ / former)) << "earlier versions named it so";
   for (const char* other : {"hall.tree", "hall.tree.part", "hall-9b1deb4d3b7d4bad.tree.part",
-                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "notes"}) {
+                            "hall-3f0c91d2-9b1deb4d3b7d4bad.ply", "a.walk", "notes"}) {
     EXPECT_TRUE(fs::exists(trees_ / other)) << other;
     EXPECT_FALSE(cache.contains(other)) << other;
   }
 }
 
-TEST_F(TreeCacheTest, MakesItsFolderAndNamesTheSettingWhereThatFails) {
+TEST_F(DerivedFilesTest, MakesItsFolderAndNamesTheSettingWhereThatFails) {
   EXPECT_FALSE(fs::exists(trees_));
-  { const TreeCache cache(trees_ / "deeper"); }
+  { const DerivedFiles cache(trees_ / "deeper"); }
   EXPECT_TRUE(fs::is_directory(trees_ / "deeper"));
   const fs::path file = write("file", "no folder");
-  EXPECT_THAT(input_error([&] { TreeCache cache(file); }),
+  EXPECT_THAT(input_error([&] { DerivedFiles cache(file); }),
               HasSubstr("--cache-dir " + file.string()));
-  EXPECT_THAT(input_error([&] { TreeCache cache(file / "below"); }), HasSubstr("--cache-dir"));
+  EXPECT_THAT(input_error([&] { DerivedFiles cache(file / "below"); }), HasSubstr("--cache-dir"));
 }
 
-TEST_F(TreeCacheTest, AFolderServesOneServerAtATime) {
+TEST_F(DerivedFilesTest, AFolderServesOneServerAtATime) {
   {
-    const TreeCache cache(trees_);
-    EXPECT_THAT(input_error([&] { TreeCache other(trees_); }), HasSubstr("another server"));
+    const DerivedFiles cache(trees_);
+    EXPECT_THAT(input_error([&] { DerivedFiles other(trees_); }), HasSubstr("another server"));
   }
-  const TreeCache next(trees_);
+  const DerivedFiles next(trees_);
 }
 
-TEST_F(TreeCacheTest, KeepsTheTreesOfPresentScenes) {
+TEST_F(DerivedFilesTest, KeepsTheTreesOfPresentScenes) {
   const std::string present = "hall-3f0c91d2-9b1deb4d3b7d4bad.tree";
   const std::string changed = "hall-3f0c91d2-0000000000000000.tree";
   const std::string absent = "barn-00000000-0000000000000001.tree";
   for (const std::string& name : {present, changed, absent}) tree(name);
-  TreeCache cache(trees_);
+  DerivedFiles cache(trees_);
   age(trees_ / present, 24h * 30);
   age(trees_ / absent, 24h * 6);
   cache.keep({present});
@@ -134,6 +138,57 @@ TEST_F(TreeCacheTest, KeepsTheTreesOfPresentScenes) {
   EXPECT_TRUE(cache.contains(present)) << "it was seen a moment ago";
   EXPECT_FALSE(cache.contains(absent));
   EXPECT_FALSE(fs::exists(trees_ / absent));
+}
+
+TEST_F(DerivedFilesTest, SmallFileIsReadAgain) {
+  const DerivedFiles cache(trees_);
+  const std::string name = "hall-3f0c91d2-9b1deb4d3b7d4bad.walk";
+  const auto any = [](const ByteSource&) {};
+  EXPECT_EQ(cache.read(name, 100, any), std::nullopt);
+  cache.write(name, "steps");
+  EXPECT_EQ(cache.read(name, 100, any), "steps");
+}
+
+TEST_F(DerivedFilesTest, DamagedSmallFileIsRemoved) {
+  const DerivedFiles cache(trees_);
+  const fs::path file = tree("hall-3f0c91d2-9b1deb4d3b7d4bad.walk");
+  EXPECT_EQ(
+      cache.read(file.filename(), 100,
+                 [](const ByteSource& bytes) { throw InputError(bytes.name(), {}, "is bad"); }),
+      std::nullopt);
+  EXPECT_FALSE(fs::exists(file));
+  tree(file.filename());
+  EXPECT_EQ(cache.read(file.filename(), 3, [](const ByteSource&) {}), std::nullopt) << "too large";
+  EXPECT_FALSE(fs::exists(file));
+}
+
+TEST_F(DerivedFilesTest, SmallFilesThatWereUsedLastStay) {
+  const DerivedFiles cache(trees_);
+  const auto name = [](int i) { return fmt::format("hall-{:08x}-{:016x}.walk", i, i); };
+  constexpr int others = 300;
+  for (int i = 0; i < others; ++i) age(tree(name(i)), std::chrono::hours(others - i));
+  const fs::path whole = tree("hall-3f0c91d2-9b1deb4d3b7d4bad.tree");
+  age(whole, 1000h);
+  cache.write(name(others), "");
+  constexpr int gone = others + 1 - static_cast<int>(DerivedFiles::most_small_files);
+  EXPECT_FALSE(fs::exists(trees_ / name(gone - 1)));
+  EXPECT_TRUE(fs::exists(trees_ / name(gone)));
+  EXPECT_TRUE(fs::exists(whole)) << "trees count apart";
+}
+
+TEST_F(DerivedFilesTest, SmallFilesOfOneSceneDropNoneOfOthers) {
+  const DerivedFiles cache(trees_);
+  const fs::path other = tree("barn-00000000-0000000000000001.walk");
+  age(other, 1h);
+  const auto name = [](std::size_t i) { return fmt::format("hall-00000001-{:016x}.walk", i); };
+  constexpr std::size_t kept = DerivedFiles::most_small_files_of_scene;
+  for (std::size_t i = 0; i < 2 * kept; ++i) {
+    cache.write(name(i), "");
+    age(trees_ / name(i), std::chrono::hours(2 * kept - i));
+  }
+  EXPECT_FALSE(fs::exists(trees_ / name(kept - 1)));
+  EXPECT_TRUE(fs::exists(trees_ / name(kept)));
+  EXPECT_TRUE(fs::exists(other));
 }
 
 }  // namespace

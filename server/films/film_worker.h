@@ -6,8 +6,8 @@
 
 #include "server/base/clock.h"
 #include "server/base/result_file.h"
+#include "server/films/film_request.h"
 #include "server/films/film_scene.h"
-#include "server/films/film_wish.h"
 
 namespace catgs {
 
@@ -27,7 +27,7 @@ inline constexpr std::uint64_t most_film_bytes = std::uint64_t{512} << 20;
 /// Draws a picture (PNG) or a film (MP4, 30 frames a second) of the scene that `take` returns into
 /// `file`, on this thread. Large pictures are drawn in parts. Throws NotDrawn, and other exceptions
 /// with words for operators.
-void draw_film(const FilmWish& wish, const FilmScene::Take& take, ResultFile& file,
+void draw_film(const FilmRequest& wanted, const FilmScene::Take& take, ResultFile& file,
                const OnDrawn& on_drawn);
 
 }  // namespace catgs
