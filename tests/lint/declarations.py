@@ -21,7 +21,7 @@ LONGER_FUNCTIONS = {
 }
 MORE_METHODS = {
     "Audience": 25, "FlowControl": 25, "Place": 25, "Places": 25, "SceneLibrary": 25, "StreamControl": 25,
-    "TreeShape": 25, "Visit": 25,
+    "Visit": 25,
 }
 MORE_FIELDS = {}
 # Classes of many fields, since each is a row of a table.
