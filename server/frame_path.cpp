@@ -61,8 +61,8 @@ void FramePath::draw(const Scheduler::Turn& turn, TimePoint now) {
   executor_->submit(std::move(job), on_session_thread<FrameResult>(io_, std::move(done)));
 }
 
-/// 4. The frame is encoded or has failed. The visit decides what becomes of it and usually sends
-/// it.
+/// 4. The frame is encoded or has failed. The visit decides what becomes of it. Usually its place
+/// sends it: 5. to the rings of the visitor's and spectators' sockets (visit/audience).
 void FramePath::encoded(Place& place, FrameResult result) {
   const TimePoint now = Clock::now();
   metrics_.frames_running.Set(scheduler_.running());
@@ -70,13 +70,6 @@ void FramePath::encoded(Place& place, FrameResult result) {
   place.account_for(result, now);
   place.visit().on_frame(std::move(result), now);
   changed(place);
-}
-
-/// 5. The frame goes to the rings of the visitor's and spectators' sockets.
-std::vector<std::uint64_t> FramePath::send(Place& place, OutgoingFrame frame) {
-  auto dropped = place.audience().send(std::move(frame), Clock::now());
-  metrics_.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
-  return dropped;
 }
 
 /// 6. The frame was seen. An acknowledgement for an unknown or already settled frame is not

@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -25,7 +24,6 @@ class FramePath : public Frames {
 
   void pose_arrived(Place& place, const PoseSample& pose, TimePoint received) override;
   void changed(Place& place) override;
-  std::vector<std::uint64_t> send(Place& place, OutgoingFrame frame) override;
   void seen(Place& place, const Ack& ack, TimePoint now) override;
   void stream_opened(Place& place, const StreamOpened& opened) override;
   void withdraw(Place& place) override { scheduler_.withdraw(place); }

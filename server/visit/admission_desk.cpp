@@ -29,11 +29,6 @@ AdmissionDesk::AdmissionDesk(const VisitContext& around, const PlaceList& places
               around.options.min_fps),
       queue_(around.options.max_queue) {}
 
-SceneAnswer AdmissionDesk::find_scene(const std::string& scene_id, TimePoint now) const {
-  if (around_.scenes.has(scene_id)) return around_.scenes.want(scene_id, now);
-  return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(scene_id), false};
-}
-
 std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello) const {
   const Permit permit = around_.authorize(hello.token);
   std::string wanted = around_.scenes.resolve(hello.scene_id);
@@ -137,7 +132,7 @@ AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
   if (offer.room == Room::yes) {
     // A client that waits for its scene holds no place: the scene may fail to load.
     queue_.leave(id);
-    auto scene = find_scene(std::get<std::string>(choice), Clock::now());
+    auto scene = find_scene(around_.scenes, std::get<std::string>(choice), Clock::now());
     if (const auto* awaited = std::get_if<SceneAwaited>(&scene)) return *awaited;
     if (auto* error = std::get_if<ErrorMessage>(&scene)) return std::move(*error);
     return let_in(place, hello, std::get<0>(std::move(scene)), offer);

@@ -23,7 +23,6 @@ class AdmissionDesk {
   /// Returns the id of the scene that a hello may open. The client must support a codec of this
   /// server. Room is not checked.
   [[nodiscard]] std::variant<std::string, ErrorMessage> choose(const Hello& hello) const;
-  [[nodiscard]] SceneAnswer find_scene(const std::string& scene_id, TimePoint now) const;
   AdmissionAnswer admit(Place& place, const Hello& hello);
   /// True: admit() would grant this hello at least half of the pixels that it wishes, and nobody
   /// would wait or give up pixels for it.

@@ -33,10 +33,6 @@ void Audience::attach(std::shared_ptr<ClientConnection> connection) {
   visitor_ = std::move(connection);
 }
 
-std::size_t Audience::queued_frames() const {
-  return visitor_ ? visitor_->connection().queued_frames() : 0;
-}
-
 void Audience::close(CloseCode code, std::string_view reason) {
   if (visitor_) visitor_->connection().close(code, reason);
 }
@@ -117,24 +113,14 @@ bool Audience::wants_idr(TimePoint now) const {
 }
 
 void Audience::keep_talking(TimePoint now) {
-  if (const auto lead = presentation_.news(spectators_.size(), !connected(), now)) {
-    if (visitor_) visitor_->connection().send(wire::serialize(*lead));
-    tell_spectators(*lead, now);
-  }
+  if (const auto lead = presentation_.news(spectators_.size(), !visitor_, now)) tell(*lead, now);
   if (last_said_ && now - *last_said_ < speak_at_least_every) return;
   tell_spectators(heartbeat_at(now), now);
 }
 
-void Audience::ping(const Pinged& pinged, TimePoint now) {
-  if (!presentation_.ping(pinged, now)) return;
-  if (visitor_) visitor_->connection().send(wire::serialize(pinged));
-  tell_spectators(pinged, now);
-}
-
-void Audience::tell_places(const Company& company, TimePoint now) {
-  if (!presentation_.tell(company, now)) return;
-  if (visitor_) visitor_->connection().send(wire::serialize(company));
-  tell_spectators(company, now);
+void Audience::tell(const ServerMessage& message, TimePoint now) {
+  if (visitor_) visitor_->connection().send(wire::serialize(message));
+  tell_spectators(message, now);
 }
 
 void Audience::end_presentation(bool elsewhere) {

@@ -27,14 +27,12 @@ class Audience {
   void attach(std::shared_ptr<ClientConnection> connection);
   /// The visitor's connection was lost or moves to another place.
   void detach() { visitor_.reset(); }
-  [[nodiscard]] bool connected() const { return visitor_ != nullptr; }
   /// Null: the visitor's connection was lost.
   [[nodiscard]] const ClientConnection* visitor() const { return visitor_.get(); }
   /// True if the visitor was last welcomed to this scene.
   [[nodiscard]] bool is_in(std::string_view scene_id) const { return scene_id_ == scene_id; }
   /// The address of the visitor's last connection.
   [[nodiscard]] const std::string& address() const { return address_; }
-  [[nodiscard]] std::size_t queued_frames() const;
   void close(CloseCode code, std::string_view reason);
 
   /// Sends to the visitor. Spectators get the messages that concern them too.
@@ -44,10 +42,9 @@ class Audience {
   std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
 
   [[nodiscard]] Presentation& presentation() { return presentation_; }
-  /// Somebody in the company points at a place. All in it hear of it, unless that is refused.
-  void ping(const Pinged& pinged, TimePoint now);
-  /// Where the company is now; empty: it is not told.
-  void tell_places(const Company& company, TimePoint now);
+  /// Sends to the visitor and to spectators. Followers are sent what concerns them by the
+  /// presentation.
+  void tell(const ServerMessage& message, TimePoint now);
   [[nodiscard]] bool full() const { return company() >= max_spectators_; }
   /// Spectators and followers.
   [[nodiscard]] std::size_t company() const {

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "server/net/messages.h"
 #include "server/schedule/frame_executor.h"
 
@@ -17,8 +14,6 @@ class Frames {
   virtual ~Frames() = default;
   virtual void pose_arrived(Place& place, const PoseSample& pose, TimePoint received) = 0;
   virtual void seen(Place& place, const Ack& ack, TimePoint now) = 0;
-  /// Returns the ids of the frames that were dropped for it.
-  virtual std::vector<std::uint64_t> send(Place& place, OutgoingFrame frame) = 0;
   virtual void stream_opened(Place& place, const StreamOpened& opened) = 0;
   /// Something else about the place has changed: a frame of it may be due, or none any more.
   virtual void changed(Place& place) = 0;

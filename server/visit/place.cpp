@@ -8,6 +8,7 @@
 
 #include "server/base/log.h"
 #include "server/base/log_event.h"
+#include "server/base/scene_id.h"
 #include "server/net/wire.h"
 #include "server/scenes/scene_entry.h"
 #include "server/schedule/on_session_thread.h"
@@ -30,49 +31,117 @@ void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
   if (error.fatal) metrics.sessions_refused.Increment();
 }
 
-void present(Place& place, const Present& wish, TimePoint now) {
-  Audience& audience = place.audience();
-  if (!wish.on) return audience.end_presentation();
-  if (!place.may_be_watched())
-    return place.send(
-        ErrorMessage{ErrorCode::unauthorized, "this link does not let others watch", false});
-  if (!audience.presentation().since()) {
-    const LogScope about(place.facts());
+/// A message of a live visit that concerns the server around it.
+struct Request {
+  Place& place;
+  ClientConnection& from;
+  const ClientMessage& message;
+  const VisitContext& around;
+  Admissions& admissions;
+  VisitTally& tally;
+  TimePoint now;
+
+  template <typename Message>
+  [[nodiscard]] const Message& as() const {
+    return std::get<Message>(message);
+  }
+  [[nodiscard]] bool leads() const { return place.audience().presentation().since().has_value(); }
+};
+
+template <typename Message>
+bool is(const ClientMessage& message) {
+  return std::holds_alternative<Message>(message);
+}
+
+bool always(const Request&) { return true; }
+// The first tells all participants, the second checks a link.
+bool begins_to_lead(const Request& r) { return r.as<Present>().on && !r.leads(); }
+bool begins_to_follow(const Request& r) { return !r.as<Follow>().watch_token.empty(); }
+
+bool may_lead(const Request& r) { return !r.as<Present>().on || r.place.may_be_watched(); }
+bool may_enter(const Request& r) {
+  return r.around.authorize(r.place.visitor().token)
+      .allows(r.around.scenes.resolve(r.as<Prepare>().scene_id), Use::own_session);
+}
+bool is_stop(const Request& r) {
+  const auto& [tour, stop] = r.as<Reached>();
+  return r.place.visit().stream().scene()->tours.has_stop(tour, stop);
+}
+
+void present(const Request& r) {
+  Audience& audience = r.place.audience();
+  if (!r.as<Present>().on) return audience.end_presentation();
+  if (!r.leads()) {
+    const LogScope about(r.place.facts());
     log_info({.event = "presents"}, "{} presents", audience.address());
   }
-  audience.presentation().begin(wish, now);
+  audience.presentation().begin(r.as<Present>(), r.now);
 }
 
-/// True if the visitor begins to lead or to follow. The first tells a whole company, the second
-/// checks a link.
-bool begins_shared_tour(const ClientMessage& message, bool leads) {
-  if (const auto* wish = std::get_if<Present>(&message)) return wish->on && !leads;
-  const auto* wish = std::get_if<Follow>(&message);
-  return wish && !wish->watch_token.empty();
+void follow(const Request& r) { r.admissions.follow(r.place, r.from, r.as<Follow>(), r.now); }
+
+void ping(const Request& r) {
+  Place* const host = r.leads() ? &r.place : r.admissions.leader_of(r.from);
+  const Pinged pinged{r.as<Ping>().place, r.leads()};
+  if (host && host->audience().presentation().ping(pinged, r.now))
+    host->audience().tell(pinged, r.now);
 }
 
-void refuse_shared_tour(Visit& visit, const ClientMessage& message, TimePoint now) {
-  visit.say(ErrorMessage{ErrorCode::rate_limited,
-                         "shared tours begin twice a second at most: try again in a moment", false},
-            now);
-  if (std::holds_alternative<Follow>(message)) visit.say(Lead{LeadState::ended, {}, 0, {}}, now);
+void prepare(const Request& r) {
+  r.around.scenes.prepare(r.around.scenes.resolve(r.as<Prepare>().scene_id), r.now);
 }
 
-void ping(Place& place, const ClientConnection& from, Admissions& admissions, const Ping& ping,
-          TimePoint now) {
-  const bool leads = place.audience().presentation().since().has_value();
-  if (Place* const host = leads ? &place : admissions.leader_of(from))
-    host->audience().ping({ping.place, leads}, now);
+void reach(const Request& r) {
+  const auto& [tour, stop] = r.as<Reached>();
+  r.tally.reached(r.place.visit().stream().scene()->facts.scene_id, r.place.visitor().device,
+                  {tour, stop});
 }
 
-void prepare(const VisitContext& around, const std::string& token, const Prepare& wish,
-             TimePoint now) {
-  const std::string scene_id = around.scenes.resolve(wish.scene_id);
-  if (around.authorize(token).allows(scene_id, Use::own_session))
-    around.scenes.prepare(scene_id, now);
+/// How requests of one kind are limited, who may send them, and who handles them. A refusal
+/// without a text is not told.
+struct Rule {
+  bool (*is_for)(const ClientMessage&);
+  RateLimit RequestLimits::*limit;  // null: none but that of all messages
+  bool (*is_limited)(const Request&);
+  std::string_view too_many;
+  bool (*may)(const Request&);
+  std::string_view forbidden;
+  void (*handle)(const Request&);
+};
+
+constexpr std::string_view too_many_tours =
+    "shared tours begin twice a second at most: try again in a moment";
+constexpr Rule rules[] = {
+    {is<Present>, &RequestLimits::shared_tours, begins_to_lead, too_many_tours, may_lead,
+     "this link does not let others watch", present},
+    {is<Follow>, &RequestLimits::shared_tours, begins_to_follow, too_many_tours, always, "",
+     follow},
+    {is<Ping>, &RequestLimits::pings, always, "", always, "", ping},
+    {is<Prepare>, &RequestLimits::preparations, always, "", may_enter, "", prepare},
+    {is<Reached>, nullptr, always, "", is_stop, "", reach},
+};
+
+void refuse(const Request& r, ErrorCode code, std::string_view why) {
+  if (why.empty()) return;
+  r.place.visit().say(ErrorMessage{code, std::string(why), false}, r.now);
+  if (is<Follow>(r.message)) r.place.visit().say(Lead{LeadState::ended, {}, 0, {}}, r.now);
+}
+
+void handle(const Rule& rule, const Request& r, RequestLimits& limits) {
+  if (rule.limit && rule.is_limited(r) && !(limits.*rule.limit).take(r.now)) {
+    if (!rule.too_many.empty() && limits.refusals.take(r.now))
+      refuse(r, ErrorCode::rate_limited, rule.too_many);
+    return;
+  }
+  rule.may(r) ? rule.handle(r) : refuse(r, ErrorCode::unauthorized, rule.forbidden);
 }
 
 }  // namespace
+
+SceneAnswer find_scene(SceneSource& scenes, const std::string& scene_id, TimePoint now) {
+  if (scenes.has(scene_id)) return scenes.want(scene_id, now);
+  return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(scene_id), false};
+}
 
 Place::Place(const VisitContext& around, Admissions& admissions, std::string session_id,
              std::string address)
@@ -82,47 +151,30 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       executor_(around.executor),
       visit_(around.options.policy, *this, Clock::now()),
       audience_(around.options.max_spectators, std::move(address)),
-      tally_(around.counts),
-      pings_(2.0, 2.0, Clock::now()),
-      preparations_(0.1, 3.0, Clock::now()),
-      shared_tours_(2.0, 8.0, Clock::now()),
-      refusals_(1.0, 1.0, Clock::now()) {}
+      tally_(around.counts) {}
 
 Place::~Place() { executor_->close(std::move(stream_)); }
 
 void Place::on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
                        TimePoint received) {
   if (audience_.visitor() != &from) return audience_.on_message(from, message);
-  visit_.on_link(link, received);
-  const auto* hello = std::get_if<Hello>(&message);
-  if (hello && visit_.life().state() == VisitState::awaiting_hello) visitor_.device = hello->device;
-  if (hello && visit_.life().state() == VisitState::awaiting_hello)
-    return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
-  if (visit_.life().state() == VisitState::live) {
-    if (begins_shared_tour(message, audience_.presentation().since().has_value()) &&
-        !shared_tours_.take(received))
-      return refusals_.take(received) ? refuse_shared_tour(visit_, message, received) : void();
-    if (const auto* wish = std::get_if<Present>(&message)) return present(*this, *wish, received);
-    if (const auto* wish = std::get_if<Follow>(&message))
-      return admissions_.follow(*this, from, *wish, received);
-    if (const auto* pinged = std::get_if<Ping>(&message))
-      return pings_.take(received) ? ping(*this, from, admissions_, *pinged, received) : void();
-    if (const auto* wish = std::get_if<Prepare>(&message))
-      return preparations_.take(received) ? prepare(around_, visitor_.token, *wish, received)
-                                          : void();
-    if (const auto* reached = std::get_if<Reached>(&message)) {
-      const SceneEntry& scene = *visit_.stream().scene();
-      if (scene.tours.has_stop(reached->tour, reached->stop))
-        tally_.reached(scene.facts.scene_id, visitor_.device, {reached->tour, reached->stop});
-      return;
-    }
-  }
+  visit_.flow().observed(link, received);
   if (const auto* pose = std::get_if<PoseSample>(&message)) {
     audience_.presentation().moved(*pose, received);
     return around_.frames.pose_arrived(*this, *pose, received);
   }
   if (const auto* ack = std::get_if<Ack>(&message))
     return around_.frames.seen(*this, *ack, received);
+  const VisitState state = visit_.life().state();
+  const auto* hello = std::get_if<Hello>(&message);
+  if (hello && state == VisitState::awaiting_hello) {
+    visitor_.device = hello->device;
+    return admissions_.on_hello(from.shared_from_this(), shared_from_this(), *hello, received);
+  }
+  const auto* const rule =
+      std::ranges::find_if(rules, [&](const Rule& candidate) { return candidate.is_for(message); });
+  if (state == VisitState::live && rule != std::end(rules))
+    return handle(*rule, {*this, from, message, around_, admissions_, tally_, received}, limits_);
   visit_.on_message(message, received);
   around_.frames.changed(*this);
 }
@@ -131,7 +183,7 @@ void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::
                           TimePoint now) {
   if (audience_.visitor() != &by) return;
   usage_.frame_sent(ticket, now);
-  visit_.on_frame_sent(packet_bytes);
+  visit_.statistics().frame_sent(packet_bytes);
 }
 
 void Place::on_close(ClientConnection& closed, bool by_leaving) {
@@ -166,18 +218,15 @@ SceneAnswer Place::find_scene(const std::string& wish) {
   const std::string scene_id = around_.scenes.resolve(wish);
   if (const auto refusal = around_.authorize(visitor_.token).refusal(scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
-  return admissions_.find_scene(scene_id, Clock::now());
-}
-
-std::vector<std::string> Place::scene_ids() {
-  std::vector<std::string> ids = around_.scenes.scene_ids();
-  const Permit permit = around_.authorize(visitor_.token);
-  std::erase_if(ids, [&](const std::string& id) { return !permit.allows(id, Use::own_session); });
-  return ids;
+  return catgs::find_scene(around_.scenes, scene_id, Clock::now());
 }
 
 void Place::sign(Welcome& welcome) {
   const SessionTokens& tokens = around_.tokens;
+  welcome.scene_ids = around_.scenes.scene_ids();
+  const Permit permit = around_.authorize(visitor_.token);
+  std::erase_if(welcome.scene_ids,
+                [&](const std::string& id) { return !permit.allows(id, Use::own_session); });
   welcome.session_id = id_;
   welcome.resume_token =
       tokens.resume_token(id_, welcome.scene.scene_id, around_.options.wall_clock_s());
@@ -200,7 +249,9 @@ void Place::send(const ServerMessage& message) {
 }
 
 std::vector<std::uint64_t> Place::send(OutgoingFrame frame) {
-  return around_.frames.send(*this, std::move(frame));
+  auto dropped = audience_.send(std::move(frame), Clock::now());
+  around_.metrics.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
+  return dropped;
 }
 
 void Place::open_stream(StreamSettings settings) {
@@ -232,9 +283,9 @@ LogFacts Place::facts() const {
           .link = visitor_.link_id};
 }
 
-void Place::on_tick(TimePoint now) {
+void Place::on_tick(TimePoint now, int sessions) {
   StreamControl& stream = visit_.stream();
-  visit_.on_tick(now, stream.ready() && stream_->view && stream_->view->outdated());
+  visit_.on_tick(now, sessions, stream.ready() && stream_->view && stream_->view->outdated());
   if (visit_.life().resumable() && !visit_.life().lost())
     if (auto newer = around_.scenes.newer_form(*stream.scene())) stream.redraw(std::move(newer));
   if (visit_.life().on_show() && stream.scene())

@@ -99,7 +99,7 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
   if (!scene_id || !known.visit().life().resumable()) return false;
   // The session's own scene is in memory. A client that selects another scene starts anew and may
   // have to wait.
-  auto found = desk_.find_scene(*scene_id, now);
+  auto found = find_scene(around_.scenes, *scene_id, now);
   auto* scene = std::get_if<std::shared_ptr<const SceneEntry>>(&found);
   if (!scene) return false;
   around_.metrics.sessions_resumed.Increment();
@@ -202,7 +202,7 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
   leave(newcomer);
   const Permit permit = around_.authorize(hello.token);
   connection->watch(host);
-  Welcome welcome = visit.stream().welcome();
+  Welcome welcome = welcome_to(visit.stream(), host);
   welcome.may_leave = permit.allows(welcome.scene.scene_id, Use::own_session);
   audience.add(connection, std::move(welcome), permit.link_id);
   {
@@ -271,7 +271,7 @@ void Places::tell_places(Place& host, TimePoint now) {
       if (const auto* visitor = place->audience().visitor(); visitor && presentation.has(*visitor))
         add(*place);
   }
-  host.audience().tell_places(company, now);
+  if (presentation.tell(company, now)) host.audience().tell(company, now);
 }
 
 void Places::leave(Place& place) {
@@ -308,9 +308,9 @@ void Places::tick() {
   PlaceList gone;
   for (const auto& place : places_) {
     if (!revoked->empty()) end_revoked(*place, *revoked);
-    place->on_tick(now);
+    place->on_tick(now, desk_.admitted());
     tell_places(*place, now);
-    if (!place->audience().connected() && place->visit().life().state() == VisitState::closed)
+    if (!place->audience().visitor() && place->visit().life().state() == VisitState::closed)
       gone.push_back(place);
   }
   for (const auto& place : gone) leave(*place);

@@ -43,12 +43,6 @@ class Places final : public Admissions {
   AdmissionAnswer admit(Place& place, const Hello& hello) override {
     return desk_.admit(place, hello);
   }
-  SceneAnswer find_scene(const std::string& scene_id, TimePoint now) override {
-    return desk_.find_scene(scene_id, now);
-  }
-  [[nodiscard]] std::uint32_t admitted() const override {
-    return static_cast<std::uint32_t>(desk_.admitted());
-  }
   void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) override;
   void stop_following(Place& place) override;
   Place* leader_of(const ClientConnection& follower) override;

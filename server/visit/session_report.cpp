@@ -92,10 +92,11 @@ SessionReport::SessionReport(Place& place)
       base_rtt(place.visit().flow().credit().base_rtt()),
       queue_delay(place.visit().flow().queue_delay()),
       target_bitrate_kbps(place.visit().flow().bitrate_kbps()),
-      steps_down(place.visit().flow().steps_down()),
+      steps_down(place.visit().flow().ladder().steps_down()),
       link(place.visit().flow().link()),
-      frames_queued(place.audience().queued_frames()),
       usage(place.usage()) {
+  if (const auto* visitor = place.audience().visitor())
+    frames_queued = visitor->connection().queued_frames();
   const StreamControl& stream = place.visit().stream();
   if (stream.encoder_kind() == EncoderKind::x264) effort = stream.plan().effort();
 }

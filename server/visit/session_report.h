@@ -32,7 +32,7 @@ struct SessionReport {
   int target_bitrate_kbps;
   std::size_t steps_down;
   LinkState link;
-  std::size_t frames_queued;
+  std::size_t frames_queued = 0;
   SessionUsage usage;
 };
 
