@@ -22,7 +22,7 @@ RequestHandlers::RequestHandlers(Parts around)
              parts.access.own_key(), unix_now_s}),
       saver(parts.scenes, parts.io, parts.config.media_origins),
       films({parts.io, [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
-             [this] { return parts.places.anybody_looks(); },
+             [this] { return parts.sessions.anybody_looks(); },
              [this](std::string_view token_id) { return parts.access.ended(token_id); }}) {
   if (parts.book)
     visits.emplace(*parts.book, unix_now_s, [this](const std::string& scene_id) {

@@ -102,7 +102,7 @@ void Visit::ask_again(TimePoint now) {
     return fail(error->code, error->message);
   awaited_scene_.reset();
   life_.enter(VisitState::queued);
-  if (const auto* place = std::get_if<QueuePlace>(&answer)) return say(*place, now);
+  if (const auto* position = std::get_if<QueuePlace>(&answer)) return say(*position, now);
   if (const auto* awaited = std::get_if<SceneAwaited>(&answer))
     return await_scene(hello_.scene_id, *awaited, now);
   life_.enter(VisitState::opening);

@@ -33,7 +33,7 @@ class Visit {
   /// Call it at least four times a second. Handles timeouts, statistics and the heartbeat.
   /// `sessions`: of the server. `outdated`: the last picture would look better now.
   void on_tick(TimePoint now, int sessions = 1, bool outdated = false);
-  /// Asks for admission again. Only while the visit waits for a place.
+  /// Asks for admission again. Only while the visit waits for a slot.
   void ask_again(TimePoint now);
   /// The connection was lost without a farewell. The visit closes after the grace period.
   void on_lost(TimePoint now);

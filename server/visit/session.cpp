@@ -1,4 +1,4 @@
-#include "server/visit/place.h"
+#include "server/visit/session.h"
 
 #include <algorithm>
 #include <numeric>
@@ -21,7 +21,7 @@ void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
   facts.event = error.fatal ? "session_refused" : "wish_refused";
   facts.code = name_of(error.code);
   const std::string text = fmt::format("{}{}: {}", facts.address, by_link(facts), error.message);
-  // Pages that wait for somebody to lead ask again and again.
+  // Pages that wait for a host ask again and again.
   if (error.code == ErrorCode::no_leader) return log_debug(facts, "{}", text);
   if (error.code == ErrorCode::internal || error.code == ErrorCode::render_failed)
     log_warning(facts, "{}", text);
@@ -33,7 +33,7 @@ void note_error(LogFacts facts, const ErrorMessage& error, Metrics& metrics) {
 
 /// A message of a live visit that concerns the server around it.
 struct Request {
-  Place& place;
+  Session& session;
   ClientConnection& from;
   const ClientMessage& message;
   const VisitContext& around;
@@ -45,7 +45,7 @@ struct Request {
   [[nodiscard]] const Message& as() const {
     return std::get<Message>(message);
   }
-  [[nodiscard]] bool leads() const { return place.audience().presentation().since().has_value(); }
+  [[nodiscard]] bool hosts() const { return session.audience().tour().since().has_value(); }
 };
 
 template <typename Message>
@@ -55,36 +55,35 @@ bool is(const ClientMessage& message) {
 
 bool always(const Request&) { return true; }
 // The first tells all participants, the second checks a link.
-bool begins_to_lead(const Request& r) { return r.as<Present>().on && !r.leads(); }
+bool begins_to_host(const Request& r) { return r.as<Present>().on && !r.hosts(); }
 bool begins_to_follow(const Request& r) { return !r.as<Follow>().watch_token.empty(); }
 
-bool may_lead(const Request& r) { return !r.as<Present>().on || r.place.may_be_watched(); }
+bool may_host(const Request& r) { return !r.as<Present>().on || r.session.may_be_watched(); }
 bool may_enter(const Request& r) {
-  return r.around.authorize(r.place.visitor().token)
+  return r.around.authorize(r.session.visitor().token)
       .allows(r.around.scenes.resolve(r.as<Prepare>().scene_id), Use::own_session);
 }
 bool is_stop(const Request& r) {
   const auto& [tour, stop] = r.as<Reached>();
-  return r.place.visit().stream().scene()->tours.has_stop(tour, stop);
+  return r.session.visit().stream().scene()->tours.has_stop(tour, stop);
 }
 
 void present(const Request& r) {
-  Audience& audience = r.place.audience();
-  if (!r.as<Present>().on) return audience.end_presentation();
-  if (!r.leads()) {
-    const LogScope about(r.place.facts());
+  Audience& audience = r.session.audience();
+  if (!r.as<Present>().on) return audience.end_tour();
+  if (!r.hosts()) {
+    const LogScope about(r.session.facts());
     log_info({.event = "presents"}, "{} presents", audience.address());
   }
-  audience.presentation().begin(r.as<Present>(), r.now);
+  audience.tour().begin(r.as<Present>(), r.now);
 }
 
-void follow(const Request& r) { r.admissions.follow(r.place, r.from, r.as<Follow>(), r.now); }
+void follow(const Request& r) { r.admissions.follow(r.session, r.from, r.as<Follow>(), r.now); }
 
 void ping(const Request& r) {
-  Place* const host = r.leads() ? &r.place : r.admissions.leader_of(r.from);
-  const Pinged pinged{r.as<Ping>().place, r.leads()};
-  if (host && host->audience().presentation().ping(pinged, r.now))
-    host->audience().tell(pinged, r.now);
+  Session* const host = r.hosts() ? &r.session : r.admissions.host_of(r.from);
+  const Pinged pinged{r.as<Ping>().place, r.hosts()};
+  if (host && host->audience().tour().ping(pinged, r.now)) host->audience().tell(pinged, r.now);
 }
 
 void prepare(const Request& r) {
@@ -93,7 +92,7 @@ void prepare(const Request& r) {
 
 void reach(const Request& r) {
   const auto& [tour, stop] = r.as<Reached>();
-  r.tally.reached(r.place.visit().stream().scene()->facts.scene_id, r.place.visitor().device,
+  r.tally.reached(r.session.visit().stream().scene()->facts.scene_id, r.session.visitor().device,
                   {tour, stop});
 }
 
@@ -112,7 +111,7 @@ struct Rule {
 constexpr std::string_view too_many_tours =
     "shared tours begin twice a second at most: try again in a moment";
 constexpr Rule rules[] = {
-    {is<Present>, &RequestLimits::shared_tours, begins_to_lead, too_many_tours, may_lead,
+    {is<Present>, &RequestLimits::shared_tours, begins_to_host, too_many_tours, may_host,
      "this link does not let others watch", present},
     {is<Follow>, &RequestLimits::shared_tours, begins_to_follow, too_many_tours, always, "",
      follow},
@@ -123,8 +122,8 @@ constexpr Rule rules[] = {
 
 void refuse(const Request& r, ErrorCode code, std::string_view why) {
   if (why.empty()) return;
-  r.place.visit().say(ErrorMessage{code, std::string(why), false}, r.now);
-  if (is<Follow>(r.message)) r.place.visit().say(Lead{LeadState::ended, {}, 0, {}}, r.now);
+  r.session.visit().say(ErrorMessage{code, std::string(why), false}, r.now);
+  if (is<Follow>(r.message)) r.session.visit().say(Lead{LeadState::ended, {}, 0, {}}, r.now);
 }
 
 void handle(const Rule& rule, const Request& r, RequestLimits& limits) {
@@ -143,8 +142,8 @@ SceneAnswer find_scene(SceneSource& scenes, const std::string& scene_id, TimePoi
   return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(scene_id), false};
 }
 
-Place::Place(const VisitContext& around, Admissions& admissions, std::string session_id,
-             std::string address)
+Session::Session(const VisitContext& around, Admissions& admissions, std::string session_id,
+                 std::string address)
     : around_(around),
       admissions_(admissions),
       id_(std::move(session_id)),
@@ -153,14 +152,14 @@ Place::Place(const VisitContext& around, Admissions& admissions, std::string ses
       audience_(around.options.max_spectators, std::move(address)),
       tally_(around.counts) {}
 
-Place::~Place() { executor_->close(std::move(stream_)); }
+Session::~Session() { executor_->close(std::move(stream_)); }
 
-void Place::on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
-                       TimePoint received) {
+void Session::on_message(ClientConnection& from, const ClientMessage& message,
+                         const LinkState& link, TimePoint received) {
   if (audience_.visitor() != &from) return audience_.on_message(from, message);
   visit_.flow().observed(link, received);
   if (const auto* pose = std::get_if<PoseSample>(&message)) {
-    audience_.presentation().moved(*pose, received);
+    audience_.tour().moved(*pose, received);
     return around_.frames.pose_arrived(*this, *pose, received);
   }
   if (const auto* ack = std::get_if<Ack>(&message))
@@ -179,14 +178,14 @@ void Place::on_message(ClientConnection& from, const ClientMessage& message, con
   around_.frames.changed(*this);
 }
 
-void Place::on_frame_sent(ClientConnection& by, const FrameTicket& ticket, std::size_t packet_bytes,
-                          TimePoint now) {
+void Session::on_frame_sent(ClientConnection& by, const FrameTicket& ticket,
+                            std::size_t packet_bytes, TimePoint now) {
   if (audience_.visitor() != &by) return;
   usage_.frame_sent(ticket, now);
   visit_.statistics().frame_sent(packet_bytes);
 }
 
-void Place::on_close(ClientConnection& closed, bool by_leaving) {
+void Session::on_close(ClientConnection& closed, bool by_leaving) {
   if (audience_.visitor() != &closed) return audience_.remove(closed);
   audience_.detach();
   if (by_leaving || !visitor_.admitted_at)
@@ -197,7 +196,7 @@ void Place::on_close(ClientConnection& closed, bool by_leaving) {
   if (visit_.life().state() == VisitState::closed) admissions_.leave(*this);
 }
 
-void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why) {
+void Session::refuse(ClientConnection& from, ErrorCode code, std::string_view why) {
   if (audience_.visitor() == &from) {
     visit_.fail(code, why);
     return around_.frames.changed(*this);
@@ -214,14 +213,14 @@ void Place::refuse(ClientConnection& from, ErrorCode code, std::string_view why)
   from.dismiss(CloseCode::policy_violation, why);
 }
 
-SceneAnswer Place::find_scene(const std::string& wish) {
+SceneAnswer Session::find_scene(const std::string& wish) {
   const std::string scene_id = around_.scenes.resolve(wish);
   if (const auto refusal = around_.authorize(visitor_.token).refusal(scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
   return catgs::find_scene(around_.scenes, scene_id, Clock::now());
 }
 
-void Place::sign(Welcome& welcome) {
+void Session::sign(Welcome& welcome) {
   const SessionTokens& tokens = around_.tokens;
   welcome.scene_ids = around_.scenes.scene_ids();
   const Permit permit = around_.authorize(visitor_.token);
@@ -233,28 +232,28 @@ void Place::sign(Welcome& welcome) {
   if (may_be_watched()) welcome.watch_token = tokens.watch_token(id_);
 }
 
-bool Place::may_be_watched() const {
+bool Session::may_be_watched() const {
   return around_.options.max_spectators > 0 &&
          around_.authorize(visitor_.token)
              .allows(visit_.stream().scene()->facts.scene_id, Use::watch);
 }
 
-void Place::send(const ServerMessage& message) {
+void Session::send(const ServerMessage& message) {
   if (const auto* error = std::get_if<ErrorMessage>(&message))
     note_error(facts(), *error, around_.metrics);
   const auto* const welcome = std::get_if<Welcome>(&message);
-  // The visitor enters another scene than the one that the leader shows.
+  // The visitor enters another scene than the one that the host shows.
   if (welcome && !audience_.is_in(welcome->scene.scene_id)) admissions_.stop_following(*this);
   audience_.send(message, Clock::now());
 }
 
-std::vector<std::uint64_t> Place::send(OutgoingFrame frame) {
+std::vector<std::uint64_t> Session::send(OutgoingFrame frame) {
   auto dropped = audience_.send(std::move(frame), Clock::now());
   around_.metrics.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
   return dropped;
 }
 
-void Place::open_stream(StreamSettings settings) {
+void Session::open_stream(StreamSettings settings) {
   executor_->open(stream_, std::move(settings),
                   on_session_thread<StreamOpened>(
                       around_.io, [self = shared_from_this()](const StreamOpened& opened) {
@@ -262,7 +261,7 @@ void Place::open_stream(StreamSettings settings) {
                       }));
 }
 
-std::optional<EncoderChoice> Place::other_encoder(Fault why) {
+std::optional<EncoderChoice> Session::other_encoder(Fault why) {
   const EncoderChoice had = visitor_.encoder;
   const bool failed = why == Fault::encoder_failed;
   if (!failed && had.kind == EncoderKind::nvenc) around_.metrics.encoders_refused.Increment();
@@ -275,7 +274,7 @@ std::optional<EncoderChoice> Place::other_encoder(Fault why) {
   return other;
 }
 
-LogFacts Place::facts() const {
+LogFacts Session::facts() const {
   const SceneEntry* const scene = visit_.stream().scene();
   return {.session = id_,
           .scene = scene ? std::string_view(scene->facts.scene_id) : std::string_view(),
@@ -283,7 +282,7 @@ LogFacts Place::facts() const {
           .link = visitor_.link_id};
 }
 
-void Place::on_tick(TimePoint now, int sessions) {
+void Session::on_tick(TimePoint now, int sessions) {
   StreamControl& stream = visit_.stream();
   visit_.on_tick(now, sessions, stream.ready() && stream_->view && stream_->view->outdated());
   if (visit_.life().resumable() && !visit_.life().lost())
@@ -297,7 +296,7 @@ void Place::on_tick(TimePoint now, int sessions) {
   if (audience_.wants_idr(now)) visit_.stream().idr().request();
 }
 
-void Place::account_for(const FrameResult& result, TimePoint now) {
+void Session::account_for(const FrameResult& result, TimePoint now) {
   const FrameTicket& ticket = result.frame.ticket;
   Metrics& metrics = around_.metrics;
   const LogScope about(facts());
@@ -314,10 +313,10 @@ void Place::account_for(const FrameResult& result, TimePoint now) {
                      size_px.x * size_px.y / (moving_px.x * moving_px.y));
 }
 
-std::shared_ptr<Place> find_place(const PlaceList& places, std::string_view session_id) {
-  const auto it =
-      std::ranges::find_if(places, [&](const auto& place) { return place->id() == session_id; });
-  return it == places.end() ? nullptr : *it;
+std::shared_ptr<Session> find_session(const SessionList& sessions, std::string_view session_id) {
+  const auto it = std::ranges::find_if(
+      sessions, [&](const auto& session) { return session->id() == session_id; });
+  return it == sessions.end() ? nullptr : *it;
 }
 
 }  // namespace catgs

@@ -15,26 +15,27 @@
 
 namespace catgs {
 
-class Place;
-using PlaceList = std::vector<std::shared_ptr<Place>>;
+class Session;
+using SessionList = std::vector<std::shared_ptr<Session>>;
 
-/// Serves a place. The owner of all places implements it.
+/// Serves a session. The owner of all sessions implements it.
 class Admissions {
  public:
   virtual ~Admissions() = default;
-  /// Hands the connection to the place of its resume or watch token, or begins the newcomer's
+  /// Hands the connection to the session of its resume or watch token, or begins the newcomer's
   /// visit.
   virtual void on_hello(const std::shared_ptr<ClientConnection>& from,
-                        std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) = 0;
-  virtual AdmissionAnswer admit(Place& place, const Hello& hello) = 0;
-  /// `from`, the place's visitor, follows another session from now on, or none.
-  virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
-  /// The place's visitor follows nobody any more, and is told so.
-  virtual void stop_following(Place& place) = 0;
-  /// The place that leads this follower; null: none does.
-  virtual Place* leader_of(const ClientConnection& follower) = 0;
-  /// The place's visit has ended.
-  virtual void leave(Place& place) = 0;
+                        std::shared_ptr<Session> newcomer, Hello hello, TimePoint now) = 0;
+  virtual AdmissionAnswer admit(Session& session, const Hello& hello) = 0;
+  /// `from`, the session's visitor, follows another session from now on, or none.
+  virtual void follow(Session& session, ClientConnection& from, const Follow& wish,
+                      TimePoint now) = 0;
+  /// The session's visitor follows nobody any more, and is told so.
+  virtual void stop_following(Session& session) = 0;
+  /// The session whose tour this client follows; null: none.
+  virtual Session* host_of(const ClientConnection& follower) = 0;
+  /// The session's visit has ended.
+  virtual void leave(Session& session) = 0;
 };
 
 /// Asks for a scene that this server may not have.
@@ -63,15 +64,15 @@ struct RequestLimits {
   RateLimit refusals{1.0, 1.0, Clock::now()};
 };
 
-/// One visit's place in the server: its Visit, its Audience, its stream on the executor and its
-/// usage of the machine. Code that changes the Visit from outside must tell Frames. Session thread
+/// A client's session: its Visit, its Audience, its stream on the executor and its usage of the
+/// machine. Code that changes the Visit from outside must tell Frames. Session thread
 /// only.
-class Place final : public VisitHost, public std::enable_shared_from_this<Place> {
+class Session final : public VisitHost, public std::enable_shared_from_this<Session> {
  public:
-  /// `around` and `admissions` outlive the place, except for its destructor.
-  Place(const VisitContext& around, Admissions& admissions, std::string session_id,
-        std::string address);
-  ~Place() override;  // any thread but the executor's
+  /// `around` and `admissions` outlive the session, except for its destructor.
+  Session(const VisitContext& around, Admissions& admissions, std::string session_id,
+          std::string address);
+  ~Session() override;  // any thread but the executor's
 
   // Called by its connections.
   void on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
@@ -112,7 +113,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
  private:
   const VisitContext& around_;
   Admissions& admissions_;
-  const std::string id_;  // of the session
+  const std::string id_;
   const std::shared_ptr<FrameExecutor> executor_;
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
   Visitor visitor_;
@@ -123,7 +124,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   RequestLimits limits_;
 };
 
-/// Returns null if no place has this id.
-std::shared_ptr<Place> find_place(const PlaceList& places, std::string_view session_id);
+/// Returns null if no session has this id.
+std::shared_ptr<Session> find_session(const SessionList& sessions, std::string_view session_id);
 
 }  // namespace catgs

@@ -1,6 +1,6 @@
 #pragma once
 
-// Places with devices and encoders that are not there, and that fail when somebody says so.
+// Sessions with devices and encoders that are not there, and that fail when somebody says so.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@
 #include "render_core/frame/device_error.h"
 #include "server/frame_path.h"
 #include "server/schedule/pool_executor.h"
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 namespace catgs::test {
 
@@ -199,31 +199,31 @@ class PretendedEncoder final : public Encoder {
   bool first_ = true;
 };
 
-/// Counts how often which place was asked for its next frame.
+/// Counts how often which session was asked for its next frame.
 class CountedFrames final : public FramePath {
  public:
   using FramePath::FramePath;
-  void changed(Place& place) override {
-    ++asked[&place];
-    FramePath::changed(place);
+  void changed(Session& session) override {
+    ++asked[&session];
+    FramePath::changed(session);
   }
-  std::map<const Place*, int> asked;
+  std::map<const Session*, int> asked;
 };
 
-class PlacesTest : public testing::Test {
+class SessionsTest : public testing::Test {
  protected:
-  PlacesTest() { options.min_fps = 0; }
+  SessionsTest() { options.min_fps = 0; }
   void start() {
     const auto executor = std::make_shared<PoolExecutor>(
         PoolExecutor::Pools{std::make_shared<ThreadPool>(pool_threads)}, encoder_factory());
     frame_path.emplace(io, executor, static_cast<int>(devices->views().size()), on_devices_lost,
                        metrics);
-    places.emplace(VisitContext{io, options, executor, *devices, *frame_path, scenes, encoders,
-                                authorize, SessionTokens("a key"), metrics, &counts});
+    sessions.emplace(VisitContext{io, options, executor, *devices, *frame_path, scenes, encoders,
+                                  authorize, SessionTokens("a key"), metrics, &counts});
   }
   void TearDown() override {
     for (auto& client : clients) client.listener->on_close(true);
-    if (places) places->stop_timer();
+    if (sessions) sessions->stop_timer();
     io.restart();
     io.run();  // until nothing is under way
     clients.clear();
@@ -253,7 +253,7 @@ class PlacesTest : public testing::Test {
       const std::string& resume_token = {}, const std::string& from = "192.0.2.1",
       const std::function<void(v1::Hello&)>& wish = [](v1::Hello&) {}) {
     auto connection = std::make_shared<OpenConnection>(from);
-    Visitor& visitor = clients.emplace_back(Visitor{connection, places->accept(connection)});
+    Visitor& visitor = clients.emplace_back(Visitor{connection, sessions->accept(connection)});
     v1::ClientMessage message;
     v1::Hello& hello = *message.mutable_hello();
     hello.set_version(1);
@@ -345,7 +345,7 @@ class PlacesTest : public testing::Test {
   VisitCounts counts{unix_now_s};
   std::deque<Visitor> clients;
   std::optional<CountedFrames> frame_path;
-  std::optional<Places> places;
+  std::optional<Sessions> sessions;
 };
 
 }  // namespace catgs::test
