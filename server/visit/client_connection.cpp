@@ -67,20 +67,17 @@ void ClientConnection::on_message(std::span<const std::byte> bytes, const LinkSt
 }
 
 void ClientConnection::refuse(ErrorCode code, std::string why) {
-  refused_ = true;
+  if (std::exchange(refused_, true)) return;
   post([code, why = std::move(why)](ClientConnection& self, Session& session) {
     session.refuse(self, code, why);
   });
 }
 
 void ClientConnection::on_bad_message(std::string_view why) {
-  if (refused_) return;
   refuse(ErrorCode::bad_message, std::string(why));
 }
 
-void ClientConnection::on_flood() {
-  if (!refused_) refuse(ErrorCode::rate_limited, "too many messages");
-}
+void ClientConnection::on_flood() { refuse(ErrorCode::rate_limited, "too many messages"); }
 
 void ClientConnection::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                                      TimePoint now) {

@@ -56,7 +56,7 @@ class ClientConnection final : public ConnectionListener,
   /// holds.
   template <typename Handle>
   void post(Handle handle, std::size_t bytes = 0);
-  /// Stops reading and closes the connection.
+  /// Stops reading and closes the connection, once.
   void refuse(ErrorCode code, std::string why);
 
   boost::asio::io_context& io_;
