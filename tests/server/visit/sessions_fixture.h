@@ -85,13 +85,13 @@ class PretendedRenderer final : public Renderer {
   [[nodiscard]] std::string description() const override { return "pretended"; }
   [[nodiscard]] std::size_t scene_bytes() const override { return 0; }
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings&) override {
-    return place_view(*devices_, {0, 1}, [this](DeviceSet::Place place) {
-      const auto device = static_cast<std::size_t>(place.device());
+    return place_view(*devices_, {0, 1}, [this](DeviceSet::Slot slot) {
+      const auto device = static_cast<std::size_t>(slot.device());
       if (lost[device]) throw DeviceError(RenderStatus::Code::device_failed, "stream: " + fault);
       if (full[device])
         throw DeviceError(RenderStatus::Code::out_of_memory, "lists: out of memory");
       ++views_made;
-      return std::make_unique<PretendedView>(*this, std::move(place));
+      return std::make_unique<PretendedView>(*this, std::move(slot));
     });
   }
 
@@ -107,11 +107,11 @@ class PretendedRenderer final : public Renderer {
  private:
   class PretendedView final : public View {
    public:
-    PretendedView(PretendedRenderer& renderer, DeviceSet::Place place)
-        : renderer_(renderer), place_(std::move(place)) {}
+    PretendedView(PretendedRenderer& renderer, DeviceSet::Slot slot)
+        : renderer_(renderer), slot_(std::move(slot)) {}
     RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
-      const auto device = static_cast<std::size_t>(place_.device());
-      renderer_.before_frame(place_.device());
+      const auto device = static_cast<std::size_t>(slot_.device());
+      renderer_.before_frame(slot_.device());
       if (renderer_.lost[device])
         return {RenderStatus::Code::device_failed, "blend: " + renderer_.fault};
       if (int left = renderer_.frames_without_memory; left > 0) {
@@ -125,11 +125,11 @@ class PretendedRenderer final : public Renderer {
     }
     [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
     [[nodiscard]] bool outdated() const override { return renderer_.outdated; }
-    [[nodiscard]] std::optional<int> device() const override { return place_.device(); }
+    [[nodiscard]] std::optional<int> device() const override { return slot_.device(); }
 
    private:
     PretendedRenderer& renderer_;
-    DeviceSet::Place place_;
+    DeviceSet::Slot slot_;
   };
 
   const std::shared_ptr<DeviceSet> devices_;
