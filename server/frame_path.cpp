@@ -18,14 +18,14 @@ FramePath::FramePath(boost::asio::io_context& io, std::shared_ptr<FrameExecutor>
       timer_(io) {}
 
 /// 1. A pose has arrived. The visit records the camera and its forecast.
-void FramePath::pose_arrived(Place& place, const PoseSample& pose, TimePoint received) {
-  place.visit().on_message(pose, received);
-  changed(place);
+void FramePath::pose_arrived(Session& session, const PoseSample& pose, TimePoint received) {
+  session.visit().on_message(pose, received);
+  changed(session);
 }
 
-/// A frame of this place may now be due.
-void FramePath::changed(Place& place) {
-  scheduler_.changed(place, Clock::now());
+/// A frame of this session may now be due.
+void FramePath::changed(Session& session) {
+  scheduler_.changed(session, Clock::now());
   start_due();
 }
 
@@ -48,59 +48,52 @@ void FramePath::start_due() {
 
 /// 3. The visit decides what to draw. The executor draws and encodes it on its own threads.
 void FramePath::draw(const Scheduler::Turn& turn, TimePoint now) {
-  Place& place = turn.source;
-  FrameJob job{place.visit().start_frame(now), place.stream()};
+  Session& session = turn.source;
+  FrameJob job{session.visit().start_frame(now), session.stream()};
   job.ticket.ready = turn.ready;
   job.ticket.started = now;
-  place.usage().frame_started(now);
+  session.usage().frame_started(now);
   metrics_.frames_running.Set(scheduler_.running());
-  auto done = [this, frame = turn.frame, self = place.shared_from_this()](FrameResult result) {
+  auto done = [this, frame = turn.frame, self = session.shared_from_this()](FrameResult result) {
     scheduler_.frame_ended(frame);
     encoded(*self, std::move(result));
   };
   executor_->submit(std::move(job), on_session_thread<FrameResult>(io_, std::move(done)));
 }
 
-/// 4. The frame is encoded or has failed. The visit decides what becomes of it and usually sends
-/// it.
-void FramePath::encoded(Place& place, FrameResult result) {
+/// 4. The frame is encoded or has failed. The visit decides what becomes of it. Usually its session
+/// sends it: 5. to the rings of the visitor's and spectators' sockets (visit/audience).
+void FramePath::encoded(Session& session, FrameResult result) {
   const TimePoint now = Clock::now();
   metrics_.frames_running.Set(scheduler_.running());
   device_failures_.frame_ended(result);
-  place.account_for(result, now);
-  place.visit().on_frame(std::move(result), now);
-  changed(place);
-}
-
-/// 5. The frame goes to the rings of the visitor's and spectators' sockets.
-std::vector<std::uint64_t> FramePath::send(Place& place, OutgoingFrame frame) {
-  auto dropped = place.audience().send(std::move(frame), Clock::now());
-  metrics_.frames_dropped_by_server.Increment(static_cast<double>(dropped.size()));
-  return dropped;
+  session.account_for(result, now);
+  session.visit().on_frame(std::move(result), now);
+  changed(session);
 }
 
 /// 6. The frame was seen. An acknowledgement for an unknown or already settled frame is not
 /// measured.
-void FramePath::seen(Place& place, const Ack& ack, TimePoint now) {
-  const CreditWindow& credit = place.visit().flow().credit();
+void FramePath::seen(Session& session, const Ack& ack, TimePoint now) {
+  const CreditWindow& credit = session.visit().flow().credit();
   const int in_flight = credit.in_flight();
-  place.visit().on_message(ack, now);
+  session.visit().on_message(ack, now);
   if (credit.in_flight() < in_flight) {
     if (ack.dropped) metrics_.frames_dropped_by_client.Increment();
     if (ack.presented_us > 0) {
       metrics_.motion_to_photon_seconds.Observe(1e-6 * ack.pose_age_us);
-      place.usage().frame_shown(1e-6 * ack.pose_age_us);
+      session.usage().frame_shown(1e-6 * ack.pose_age_us);
     }
   }
-  changed(place);
+  changed(session);
 }
 
 /// Before the first frame, the executor has made a View and an encoder, or failed.
-void FramePath::stream_opened(Place& place, const StreamOpened& opened) {
+void FramePath::stream_opened(Session& session, const StreamOpened& opened) {
   if (!opened.ok) metrics_.streams_failed.Increment();
   device_failures_.stream_opened(opened);
-  place.visit().on_stream_opened(opened, Clock::now());
-  changed(place);
+  session.visit().on_stream_opened(opened, Clock::now());
+  changed(session);
 }
 
 }  // namespace catgs

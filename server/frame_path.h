@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -11,7 +10,7 @@
 #include "server/schedule/device_failures.h"
 #include "server/schedule/frame_executor.h"
 #include "server/schedule/scheduler.h"
-#include "server/visit/place.h"
+#include "server/visit/session.h"
 
 namespace catgs {
 
@@ -23,19 +22,18 @@ class FramePath : public Frames {
   FramePath(boost::asio::io_context& io, std::shared_ptr<FrameExecutor> executor, int devices,
             DeviceFailures::OnLost on_devices_lost, Metrics& metrics);
 
-  void pose_arrived(Place& place, const PoseSample& pose, TimePoint received) override;
-  void changed(Place& place) override;
-  std::vector<std::uint64_t> send(Place& place, OutgoingFrame frame) override;
-  void seen(Place& place, const Ack& ack, TimePoint now) override;
-  void stream_opened(Place& place, const StreamOpened& opened) override;
-  void withdraw(Place& place) override { scheduler_.withdraw(place); }
+  void pose_arrived(Session& session, const PoseSample& pose, TimePoint received) override;
+  void changed(Session& session) override;
+  void seen(Session& session, const Ack& ack, TimePoint now) override;
+  void stream_opened(Session& session, const StreamOpened& opened) override;
+  void withdraw(Session& session) override { scheduler_.withdraw(session); }
 
  private:
-  using Scheduler = FrameScheduler<Place>;
+  using Scheduler = FrameScheduler<Session>;
 
   void start_due();
   void draw(const Scheduler::Turn& turn, TimePoint now);
-  void encoded(Place& place, FrameResult result);
+  void encoded(Session& session, FrameResult result);
 
   boost::asio::io_context& io_;
   const std::shared_ptr<FrameExecutor> executor_;

@@ -9,7 +9,7 @@
 #include "server/config/config.h"
 #include "server/net/net_server.h"
 #include "server/scenes/sidecar_saver.h"
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 namespace catgs {
 namespace {
@@ -66,17 +66,17 @@ void GracefulStop::give_up(const std::string& why) {
 
 void GracefulStop::drain(std::chrono::milliseconds deadline) {
   log_info({.event = "drain"}, "stopping: {} connections are asked to reconnect",
-           parts_->places.connections());
-  parts_->places.drain(deadline);
+           parts_->sessions.connections());
+  parts_->sessions.drain(deadline);
   parts_->saver.stop();
   when_empty(Clock::now() + deadline, [this] {
-    parts_->places.close_all();
+    parts_->sessions.close_all();
     when_empty(Clock::now() + farewell_time, [this] { finish(); });
   });
 }
 
 void GracefulStop::when_empty(TimePoint deadline, std::function<void()> then) {
-  const bool empty = parts_->places.connections() == 0 && parts_->net.uploads() == 0;
+  const bool empty = parts_->sessions.connections() == 0 && parts_->net.uploads() == 0;
   if (empty || Clock::now() >= deadline) return then();
   timer_.expires_after(drain_poll);
   timer_.async_wait([this, deadline, then = std::move(then)](const boost::system::error_code&) {
@@ -86,7 +86,7 @@ void GracefulStop::when_empty(TimePoint deadline, std::function<void()> then) {
 
 void GracefulStop::finish() {
   parts_->net.stop();
-  parts_->places.stop_timer();
+  parts_->sessions.stop_timer();
   signals_.cancel();  // nothing is left to wait for but frames under way: io.run() returns
 }
 

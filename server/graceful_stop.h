@@ -16,7 +16,7 @@
 namespace catgs {
 
 class NetServer;
-class Places;
+class Sessions;
 class SidecarSaver;
 struct ServerConfig;
 
@@ -30,7 +30,7 @@ class GracefulStop {
   struct Parts {
     const ServerConfig& config;
     std::atomic<bool>& ready;
-    Places& places;
+    Sessions& sessions;
     SidecarSaver& saver;
     NetServer& net;
   };

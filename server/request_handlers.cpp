@@ -23,7 +23,7 @@ RequestHandlers::RequestHandlers(Parts around)
       saver(parts.scenes, parts.background, parts.io, parts.config.media_origins),
       films({parts.io, parts.background,
              [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },
-             [this] { return parts.places.anybody_looks(); },
+             [this] { return parts.sessions.anybody_looks(); },
              [this](std::string_view token_id) { return parts.access.ended(token_id); }}) {
   if (parts.statistics)
     visits.emplace(*parts.statistics, unix_now_s, [this](const std::string& scene_id) {

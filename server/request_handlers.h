@@ -16,7 +16,7 @@
 #include "server/scenes/scene_api.h"
 #include "server/scenes/scene_library.h"
 #include "server/scenes/sidecar_saver.h"
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 namespace catgs {
 
@@ -35,7 +35,7 @@ struct RequestHandlers {
     SceneLibrary& scenes;
     AccessControl& access;
     Authorize authorize;
-    const Places& places;
+    const Sessions& sessions;
     const DeviceSet& devices;
     const Liveness& liveness;
     const std::atomic<bool>& ready;

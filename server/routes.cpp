@@ -144,7 +144,7 @@ HttpResponse metrics_json(RequestHandlers& handlers, const RouteRequest&) {
 }
 
 HttpResponse session_list(RequestHandlers& handlers, const RouteRequest&) {
-  return text_response(200, handlers.parts.places.published_json(), "application/json");
+  return text_response(200, handlers.parts.sessions.published_json(), "application/json");
 }
 
 /// The page asks for its document at its own address with ".json" added.

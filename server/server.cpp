@@ -29,7 +29,7 @@
 #include "server/scenes/scene_library.h"
 #include "server/schedule/pool_executor.h"
 #include "server/schedule/watched_executor.h"
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 namespace catgs {
 namespace {
@@ -86,7 +86,7 @@ struct Server::State {
   std::unique_ptr<SceneLibrary> scenes;
   std::vector<EncoderChoice> encoders;
   std::unique_ptr<FramePath> frames;
-  std::unique_ptr<Places> places;
+  std::unique_ptr<Sessions> sessions;
   std::optional<RequestHandlers> handlers;  // their threads use what is above
   std::optional<Router> router, admin_router;
   GracefulStop graceful_stop{io};
@@ -108,7 +108,7 @@ NetOptions Server::State::net_options() {
   };
   options.uploads.on_full = [this] { metrics.uploads_refused.Increment(); };
   options.accept = [this](std::shared_ptr<Connection> connection) {
-    return places->accept(std::move(connection));
+    return sessions->accept(std::move(connection));
   };
   options.on_refused = [this](const LogFacts& facts, const std::string& text) {
     metrics.requests_refused.Increment();
@@ -162,25 +162,25 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
       s.io, executor, static_cast<int>(s.core.devices->views().size()),
       [&s](const auto& why) { s.graceful_stop.give_up("no device renders any more: " + why); },
       s.metrics);
-  s.places = std::make_unique<Places>(
+  s.sessions = std::make_unique<Sessions>(
       VisitContext{s.io, options, executor, *s.core.devices, *s.frames, *s.scenes, s.encoders,
                    authorize, SessionTokens(s.access.own_key()), s.metrics,
                    s.counts ? &*s.counts : nullptr, [&s] { return s.access.revoked_links(); }});
   s.handlers.emplace(RequestHandlers::Parts{
-      s.io, *s.background, s.config, *s.scenes, s.access, authorize, *s.places, *s.core.devices,
+      s.io, *s.background, s.config, *s.scenes, s.access, authorize, *s.sessions, *s.core.devices,
       s.liveness, s.ready, s.metrics, s.client, s.statistics ? &*s.statistics : nullptr});
   s.router.emplace(public_routes(), *s.handlers);
   s.admin_router.emplace(admin_routes(), *s.handlers);
 }
 
 Server::~Server() {
-  // The network thread hands connections to the places, which are destroyed before the network.
+  // The network thread hands connections to the sessions, which are destroyed before the network.
   if (state_) state_->net.stop();
 }
 
 void Server::run() {
   State& s = *state_;
-  s.graceful_stop.start({s.config, s.ready, *s.places, s.handlers->saver, s.net});
+  s.graceful_stop.start({s.config, s.ready, *s.sessions, s.handlers->saver, s.net});
   s.net.start();
   run_promptly();  // after the other threads were started
   s.ready = true;

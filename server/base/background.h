@@ -165,7 +165,7 @@ class Background::Jobs {
   /// A job that has not begun is not run; the stop of one under way is requested.
   void cancel(JobId id);
   void set_priority(JobId id, Priority priority);
-  /// Takes no more jobs, and drops those that wait. Those under way go on.
+  /// Takes no more jobs, and drops those that wait. Those under way continue.
   void close();
   /// Also requests the stop of those under way, and waits for their end.
   void end();

@@ -73,7 +73,11 @@ bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
   if (!settled) return false;
   observe_network(ack, *settled, now);
   observe_decoder(ack, *settled, now);
-  observe_pose_age(ack);
+  if (ack.presented_us > 0) {
+    const double age_us = std::min(static_cast<double>(ack.pose_age_us), most_horizon_us);
+    if (pose_to_photon_us_ == 0.0) pose_to_photon_us_ = age_us;
+    pose_to_photon_us_ += horizon_smoothing * (age_us - pose_to_photon_us_);
+  }
   // The rest has passed, even if the link's rate was underestimated.
   carried_by_ = std::min(*carried_by_, now + time_on_link(credit_.bytes_in_flight(), now));
   if (!wish_.fixed_quality) credit_.set_link_rate(network_.rate());
@@ -110,13 +114,6 @@ void FlowControl::observe_decoder(const Ack& ack, const CreditWindow::Settled& s
   sample.round_trip = settled.round_trip;
   decoder_.add(sample, now);
   apply_interval();
-}
-
-void FlowControl::observe_pose_age(const Ack& ack) {
-  if (ack.presented_us <= 0) return;
-  const double age_us = std::min(static_cast<double>(ack.pose_age_us), most_horizon_us);
-  if (pose_to_photon_us_ == 0.0) pose_to_photon_us_ = age_us;
-  pose_to_photon_us_ += horizon_smoothing * (age_us - pose_to_photon_us_);
 }
 
 void FlowControl::observed(const LinkState& link, TimePoint now) {
@@ -185,7 +182,7 @@ microseconds FlowControl::frame_interval() const {
   if (wish_.fixed_quality) return interval_of(wish_.fps);
   const double pixels = static_cast<double>(frame_size_px_.x) * frame_size_px_.y;
   const double decoded_fps = std::max(least_paced_fps, decoder_.rate() / pixels);
-  return interval_of(std::min(wish_.fps * rung().fps_share, decoded_fps));
+  return interval_of(std::min(wish_.fps * ladder_.rung().fps_share, decoded_fps));
 }
 
 microseconds FlowControl::pose_to_photon() const {

@@ -71,8 +71,7 @@ class FlowControl {
   [[nodiscard]] std::chrono::microseconds time_on_link(std::size_t bytes, TimePoint now) const;
   /// The backlog that the link will still have at `then`, as a duration.
   [[nodiscard]] std::chrono::microseconds standing(TimePoint then) const;
-  [[nodiscard]] const Rung& rung() const { return ladder_.rung(); }
-  [[nodiscard]] std::size_t steps_down() const { return ladder_.steps_down(); }
+  [[nodiscard]] const QualityLadder& ladder() const { return ladder_; }
   /// The interval between frame starts, for the current rung and decoder.
   [[nodiscard]] std::chrono::microseconds frame_interval() const;
   /// The time from a pose's sample to its picture on the display, at most 100 ms; 0: not known.
@@ -85,7 +84,6 @@ class FlowControl {
  private:
   void observe_network(const Ack& ack, const CreditWindow::Settled& settled, TimePoint now);
   void observe_decoder(const Ack& ack, const CreditWindow::Settled& settled, TimePoint now);
-  void observe_pose_age(const Ack& ack);
   void apply_interval();
 
   FlowWish wish_;

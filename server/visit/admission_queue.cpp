@@ -22,8 +22,8 @@ void AdmissionQueue::session_ended(std::chrono::duration<double> lifetime) {
   mean_lifetime_ += (lifetime - mean_lifetime_) * weight;
 }
 
-std::chrono::seconds AdmissionQueue::estimate(int position, int places) const {
-  return std::chrono::ceil<std::chrono::seconds>(mean_lifetime_ * position / std::max(1, places));
+std::chrono::seconds AdmissionQueue::estimate(int position, int slots) const {
+  return std::chrono::ceil<std::chrono::seconds>(mean_lifetime_ * position / std::max(1, slots));
 }
 
 }  // namespace catgs

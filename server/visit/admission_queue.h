@@ -12,7 +12,7 @@
 
 namespace catgs {
 
-/// A bounded queue, first in, first out, of sessions that wait for a place. Pure; not thread-safe.
+/// A bounded queue, first in, first out, of sessions that wait for a slot. Pure; not thread-safe.
 class AdmissionQueue {
  public:
   explicit AdmissionQueue(int limit) : limit_(static_cast<std::size_t>(limit)) {}
@@ -34,9 +34,9 @@ class AdmissionQueue {
 
   /// Records the lifetime of a session that ended. Estimates are made from the mean.
   void session_ended(std::chrono::duration<double> lifetime);
-  /// The expected wait at `position`. With `places` sessions, one ends every mean lifetime /
-  /// `places` on average.
-  [[nodiscard]] std::chrono::seconds estimate(int position, int places) const;
+  /// The expected wait at `position`. With `slots` sessions, one ends every mean lifetime /
+  /// `slots` on average.
+  [[nodiscard]] std::chrono::seconds estimate(int position, int slots) const;
 
  private:
   const std::size_t limit_;

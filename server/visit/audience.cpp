@@ -33,10 +33,6 @@ void Audience::attach(std::shared_ptr<ClientConnection> connection) {
   visitor_ = std::move(connection);
 }
 
-std::size_t Audience::queued_frames() const {
-  return visitor_ ? visitor_->connection().queued_frames() : 0;
-}
-
 void Audience::close(CloseCode code, std::string_view reason) {
   if (visitor_) visitor_->connection().close(code, reason);
 }
@@ -44,11 +40,11 @@ void Audience::close(CloseCode code, std::string_view reason) {
 void Audience::send(const ServerMessage& message, TimePoint now) {
   if (visitor_) visitor_->connection().send(wire::serialize(message));
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    // Its company sends a new hello, if it wants to see what the visitor presents there. Each gets
-    // a visit of its own where its own link allows that, and watches otherwise.
+    // Its participants send a new hello, if they want to see what the visitor shows there. Each
+    // gets a visit of its own where its own link allows that, and watches otherwise.
     if (!is_in(welcome->scene.scene_id)) {
-      end_presentation(true);
-      presentation_.forget_camera();
+      end_tour(true);
+      tour_.forget_camera();
       scene_id_ = welcome->scene.scene_id;
     }
     tell_spectators(for_spectators(*welcome), now);
@@ -72,7 +68,7 @@ std::vector<std::uint64_t> Audience::send(OutgoingFrame frame, TimePoint now) {
 void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome,
                    std::string link_id) {
   spectator->connection().send(wire::serialize(for_spectators(std::move(welcome))));
-  if (const Company& company = presentation_.places_told(); !company.places.empty())
+  if (const Company& company = tour_.positions_told(); !company.places.empty())
     spectator->connection().send(wire::serialize(company));
   spectators_.push_back({std::move(spectator), true, std::move(link_id)});
 }
@@ -117,28 +113,18 @@ bool Audience::wants_idr(TimePoint now) const {
 }
 
 void Audience::keep_talking(TimePoint now) {
-  if (const auto lead = presentation_.news(spectators_.size(), !connected(), now)) {
-    if (visitor_) visitor_->connection().send(wire::serialize(*lead));
-    tell_spectators(*lead, now);
-  }
+  if (const auto lead = tour_.news(spectators_.size(), !visitor_, now)) tell(*lead, now);
   if (last_said_ && now - *last_said_ < speak_at_least_every) return;
   tell_spectators(heartbeat_at(now), now);
 }
 
-void Audience::ping(const Pinged& pinged, TimePoint now) {
-  if (!presentation_.ping(pinged, now)) return;
-  if (visitor_) visitor_->connection().send(wire::serialize(pinged));
-  tell_spectators(pinged, now);
+void Audience::tell(const ServerMessage& message, TimePoint now) {
+  if (visitor_) visitor_->connection().send(wire::serialize(message));
+  tell_spectators(message, now);
 }
 
-void Audience::tell_places(const Company& company, TimePoint now) {
-  if (!presentation_.tell(company, now)) return;
-  if (visitor_) visitor_->connection().send(wire::serialize(company));
-  tell_spectators(company, now);
-}
-
-void Audience::end_presentation(bool elsewhere) {
-  presentation_.end(elsewhere);
+void Audience::end_tour(bool elsewhere) {
+  tour_.end(elsewhere);
   for (const Spectator& s : std::exchange(spectators_, {})) {
     s.connection->connection().send(wire::serialize(
         ErrorMessage{ErrorCode::session_ended, "the presentation has ended", true}));

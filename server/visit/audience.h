@@ -10,12 +10,12 @@
 
 #include "server/access/authorize.h"
 #include "server/visit/client_connection.h"
-#include "server/visit/presentation.h"
+#include "server/visit/shared_tour.h"
 
 namespace catgs {
 
 /// The receivers of a visit's frames: its visitor, if connected, and spectators. While the visit
-/// presents, it may also have followers, who get its camera instead. Spectators get the
+/// hosts a tour, it may also have followers, who get its camera instead. Spectators get the
 /// frames as encoded for the visitor, who never waits for them. A spectator that reads too slowly
 /// misses frames up to the next IDR. Session thread only.
 class Audience {
@@ -25,16 +25,14 @@ class Audience {
 
   /// `connection` becomes the visitor's connection. The previous one is closed.
   void attach(std::shared_ptr<ClientConnection> connection);
-  /// The visitor's connection was lost or moves to another place.
+  /// The visitor's connection was lost or moves to another session.
   void detach() { visitor_.reset(); }
-  [[nodiscard]] bool connected() const { return visitor_ != nullptr; }
   /// Null: the visitor's connection was lost.
   [[nodiscard]] const ClientConnection* visitor() const { return visitor_.get(); }
   /// True if the visitor was last welcomed to this scene.
   [[nodiscard]] bool is_in(std::string_view scene_id) const { return scene_id_ == scene_id; }
   /// The address of the visitor's last connection.
   [[nodiscard]] const std::string& address() const { return address_; }
-  [[nodiscard]] std::size_t queued_frames() const;
   void close(CloseCode code, std::string_view reason);
 
   /// Sends to the visitor. Spectators get the messages that concern them too.
@@ -43,16 +41,12 @@ class Audience {
   /// dropped.
   std::vector<std::uint64_t> send(OutgoingFrame frame, TimePoint now);
 
-  [[nodiscard]] Presentation& presentation() { return presentation_; }
-  /// Somebody in the company points at a place. All in it hear of it, unless that is refused.
-  void ping(const Pinged& pinged, TimePoint now);
-  /// Where the company is now; empty: it is not told.
-  void tell_places(const Company& company, TimePoint now);
-  [[nodiscard]] bool full() const { return company() >= max_spectators_; }
+  [[nodiscard]] SharedTour& tour() { return tour_; }
+  /// Sends to the visitor and to spectators. The tour sends to followers.
+  void tell(const ServerMessage& message, TimePoint now);
+  [[nodiscard]] bool full() const { return participants() >= max_spectators_; }
   /// Spectators and followers.
-  [[nodiscard]] std::size_t company() const {
-    return spectators_.size() + presentation_.followers();
-  }
+  [[nodiscard]] std::size_t participants() const { return spectators_.size() + tour_.followers(); }
   [[nodiscard]] std::size_t spectators() const { return spectators_.size(); }
   /// The spectator is sent `welcome` first, without the visitor's secrets. Frames follow from the
   /// next IDR on.
@@ -68,12 +62,12 @@ class Audience {
   /// Call it at least four times a second. True: a spectator waits for an IDR and the last one was
   /// sent a second or more ago.
   [[nodiscard]] bool wants_idr(TimePoint now) const;
-  /// Sends everybody what is new about the presentation, and spectators a heartbeat after almost a
+  /// Sends everybody what is new about the tour, and spectators a heartbeat after almost a
   /// second of silence.
   void keep_talking(TimePoint now);
-  /// Ends the presentation and closes all spectators' connections. `elsewhere`: the visitor is in
+  /// Ends the tour and closes all spectators' connections. `elsewhere`: the visitor is in
   /// another scene.
-  void end_presentation(bool elsewhere = false);
+  void end_tour(bool elsewhere = false);
 
  private:
   struct Spectator {
@@ -87,7 +81,7 @@ class Audience {
   const std::size_t max_spectators_;
   std::string address_;
   std::vector<Spectator> spectators_;
-  Presentation presentation_;
+  SharedTour tour_;
   std::string scene_id_;  // as of the last welcome
   std::optional<TimePoint> last_idr_;
   std::optional<TimePoint> last_said_;  // to spectators

@@ -6,7 +6,7 @@
 
 #include "server/net/wire.h"
 #include "server/pipeline/frame_metrics.h"
-#include "server/visit/place.h"
+#include "server/visit/session.h"
 
 namespace catgs {
 namespace {
@@ -36,7 +36,7 @@ void ClientConnection::post(Handle handle, std::size_t bytes) {
   boost::asio::post(io_, [self = shared_from_this(), handle = std::move(handle), bytes]() mutable {
     --self->waiting_messages_;
     self->waiting_bytes_ -= bytes;
-    if (const auto place = self->place_.lock()) handle(*self, *place);
+    if (const auto session = self->session_.lock()) handle(*self, *session);
   });
 }
 
@@ -51,34 +51,33 @@ void ClientConnection::on_message(std::span<const std::byte> bytes, const LinkSt
   if (const auto* sample = std::get_if<PoseSample>(&message)) {
     metrics_.poses_received.Increment();
     if (!latest_pose_.store({*sample, now, link})) return metrics_.poses_superseded.Increment();
-    return post([](ClientConnection& self, Place& place) {
+    return post([](ClientConnection& self, Session& session) {
       if (const auto pose = self.latest_pose_.take())
-        place.on_message(self, pose->sample, pose->link, pose->received);
+        session.on_message(self, pose->sample, pose->link, pose->received);
     });
   }
   if (waiting_messages_ >= max_waiting_messages ||
       waiting_bytes_ + bytes.size() > max_waiting_bytes)
     return refuse(ErrorCode::rate_limited, "too many messages wait");
-  post([message = std::move(message), now, link](
-           ClientConnection& self, Place& place) { place.on_message(self, message, link, now); },
-       bytes.size());
+  post(
+      [message = std::move(message), now, link](ClientConnection& self, Session& session) {
+        session.on_message(self, message, link, now);
+      },
+      bytes.size());
 }
 
 void ClientConnection::refuse(ErrorCode code, std::string why) {
-  refused_ = true;
-  post([code, why = std::move(why)](ClientConnection& self, Place& place) {
-    place.refuse(self, code, why);
+  if (std::exchange(refused_, true)) return;
+  post([code, why = std::move(why)](ClientConnection& self, Session& session) {
+    session.refuse(self, code, why);
   });
 }
 
 void ClientConnection::on_bad_message(std::string_view why) {
-  if (refused_) return;
   refuse(ErrorCode::bad_message, std::string(why));
 }
 
-void ClientConnection::on_flood() {
-  if (!refused_) refuse(ErrorCode::rate_limited, "too many messages");
-}
+void ClientConnection::on_flood() { refuse(ErrorCode::rate_limited, "too many messages"); }
 
 void ClientConnection::on_frame_sent(const FrameTicket& ticket, std::size_t packet_bytes,
                                      TimePoint now) {
@@ -88,30 +87,30 @@ void ClientConnection::on_frame_sent(const FrameTicket& ticket, std::size_t pack
   observe_frame(metrics_, ticket, now);
   // Not post(): this is not a client's message.
   boost::asio::post(io_, [self = shared_from_this(), ticket, packet_bytes, now] {
-    if (const auto place = self->place_.lock())
-      place->on_frame_sent(*self, ticket, packet_bytes, now);
+    if (const auto session = self->session_.lock())
+      session->on_frame_sent(*self, ticket, packet_bytes, now);
   });
 }
 
 void ClientConnection::on_close(bool by_leaving) {
   boost::asio::post(io_, [self = shared_from_this(), by_leaving] {
-    if (const auto place = self->place_.lock()) place->on_close(*self, by_leaving);
+    if (const auto session = self->session_.lock()) session->on_close(*self, by_leaving);
     self->on_closed_();
   });
 }
 
-void ClientConnection::belong_to(Place& place) {
-  place_ = place.weak_from_this();
-  place.audience().attach(shared_from_this());
+void ClientConnection::belong_to(Session& session) {
+  session_ = session.weak_from_this();
+  session.audience().attach(shared_from_this());
 }
 
-void ClientConnection::watch(Place& place) {
+void ClientConnection::watch(Session& session) {
   watching_ = true;
-  place_ = place.weak_from_this();
+  session_ = session.weak_from_this();
 }
 
 void ClientConnection::dismiss(CloseCode code, std::string_view reason) {
-  place_.reset();
+  session_.reset();
   connection_->close(code, reason);
 }
 

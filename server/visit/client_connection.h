@@ -16,10 +16,10 @@
 
 namespace catgs {
 
-class Place;
+class Session;
 
 /// The visits' end of one websocket. Messages from the network thread are rate-limited, parsed and
-/// posted to the session thread. The connection belongs to one Place: its own new one, the one of
+/// posted to the session thread. The connection belongs to one Session: its own new one, the one of
 /// its resume token, or the one that it watches. Poses go through a slot that keeps only the
 /// newest. Other messages are posted one by one, up to a bound.
 class ClientConnection final : public ConnectionListener,
@@ -37,11 +37,11 @@ class ClientConnection final : public ConnectionListener,
   void on_close(bool by_leaving) override;
 
   // Session thread.
-  /// Makes this the connection of the visitor of `place`. The place's previous connection is
+  /// Makes this the connection of the visitor of `session`. The session's previous connection is
   /// closed.
-  void belong_to(Place& place);
+  void belong_to(Session& session);
   /// Makes this a spectator's connection. Frames sent to it are left out of latency measurements.
-  void watch(Place& place);
+  void watch(Session& session);
   /// Closes the connection. Messages that still arrive are dropped.
   void dismiss(CloseCode code, std::string_view reason);
   [[nodiscard]] Connection& connection() const { return *connection_; }
@@ -52,10 +52,11 @@ class ClientConnection final : public ConnectionListener,
     TimePoint received;
     LinkState link;
   };
-  /// Posts `handle(place)` to the session thread. `bytes` is the size of the message that it holds.
+  /// Posts `handle(session)` to the session thread. `bytes` is the size of the message that it
+  /// holds.
   template <typename Handle>
   void post(Handle handle, std::size_t bytes = 0);
-  /// Stops reading and closes the connection.
+  /// Stops reading and closes the connection, once.
   void refuse(ErrorCode code, std::string why);
 
   boost::asio::io_context& io_;
@@ -69,7 +70,7 @@ class ClientConnection final : public ConnectionListener,
   std::atomic<int> waiting_messages_{0};
   std::atomic<std::size_t> waiting_bytes_{0};
   LatestSlot<ReceivedPose> latest_pose_;
-  std::weak_ptr<Place> place_;  // session thread
+  std::weak_ptr<Session> session_;  // session thread
   std::atomic<bool> watching_{false};
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/visit/place.h"
+#include "server/visit/session.h"
 
 namespace catgs {
 
@@ -11,7 +11,7 @@ class MachineUse {
   explicit MachineUse(const VisitContext& around);
 
   /// Call it four times a second.
-  void on_tick(const PlaceList& places, int admitted, TimePoint now);
+  void on_tick(const SessionList& sessions, int admitted, TimePoint now);
   /// The effort for a newcomer. `sessions` includes it.
   [[nodiscard]] EncoderEffort initial_effort(int sessions, glm::ivec2 size_px) const {
     return effort_.initial(sessions, size_px);
@@ -19,11 +19,11 @@ class MachineUse {
 
  private:
   /// Divides the processor time since the last call among the sessions.
-  void charge_cpu(const PlaceList& places, TimePoint now);
+  void charge_cpu(const SessionList& sessions, TimePoint now);
   /// Reports the measured loads to the devices.
-  void report_loads(const PlaceList& places);
+  void report_loads(const SessionList& sessions);
   /// Changes encoder efforts where the measurements ask for it.
-  void control_effort(const PlaceList& places, int admitted, TimePoint now);
+  void control_effort(const SessionList& sessions, int admitted, TimePoint now);
 
   const VisitContext& around_;
   EffortControl effort_;

@@ -85,7 +85,7 @@ void PicturePlan::update() {
   FlowWish wish = wish_within(policy_, settings_, viewport_px_);
   wish.size_px = scaled_size(wish.size_px, std::sqrt(pixel_share_));
   flow_.set_wish(wish);
-  moving_.size_px = scaled_size(wish.size_px, flow_.rung().scale);
+  moving_.size_px = scaled_size(wish.size_px, flow_.ladder().rung().scale);
   moving_.fps = wish.fps;
   moving_.bitrate_kbps = wish.bitrate_kbps;
   apply(effort_, moving_);

@@ -75,35 +75,36 @@ nlohmann::json report_json(const SessionReport& report) {
 
 }  // namespace
 
-SessionReport::SessionReport(Place& place)
-    : id(place.id()),
-      state(state_name(place.visit())),
-      paused(place.visit().life().paused()),
-      spectators(place.audience().spectators()),
-      scene_id(place.visit().stream().scene() ? place.visit().stream().scene()->facts.scene_id
-                                              : ""),
-      config(place.visit().stream().config()),
-      device(place.visit().stream().device()),
-      frames_sent(place.visit().statistics().frames_sent()),
-      frames_dropped(place.visit().statistics().frames_dropped()),
-      bytes_sent(place.visit().statistics().bytes_sent()),
-      frames_in_flight(place.visit().flow().credit().in_flight()),
-      credit(place.visit().flow().credit().limit()),
-      base_rtt(place.visit().flow().credit().base_rtt()),
-      queue_delay(place.visit().flow().queue_delay()),
-      target_bitrate_kbps(place.visit().flow().bitrate_kbps()),
-      steps_down(place.visit().flow().steps_down()),
-      link(place.visit().flow().link()),
-      frames_queued(place.audience().queued_frames()),
-      usage(place.usage()) {
-  const StreamControl& stream = place.visit().stream();
+SessionReport::SessionReport(Session& session)
+    : id(session.id()),
+      state(state_name(session.visit())),
+      paused(session.visit().life().paused()),
+      spectators(session.audience().spectators()),
+      scene_id(session.visit().stream().scene() ? session.visit().stream().scene()->facts.scene_id
+                                                : ""),
+      config(session.visit().stream().config()),
+      device(session.visit().stream().device()),
+      frames_sent(session.visit().statistics().frames_sent()),
+      frames_dropped(session.visit().statistics().frames_dropped()),
+      bytes_sent(session.visit().statistics().bytes_sent()),
+      frames_in_flight(session.visit().flow().credit().in_flight()),
+      credit(session.visit().flow().credit().limit()),
+      base_rtt(session.visit().flow().credit().base_rtt()),
+      queue_delay(session.visit().flow().queue_delay()),
+      target_bitrate_kbps(session.visit().flow().bitrate_kbps()),
+      steps_down(session.visit().flow().ladder().steps_down()),
+      link(session.visit().flow().link()),
+      usage(session.usage()) {
+  if (const auto* visitor = session.audience().visitor())
+    frames_queued = visitor->connection().queued_frames();
+  const StreamControl& stream = session.visit().stream();
   if (stream.encoder_kind() == EncoderKind::x264) effort = stream.plan().effort();
 }
 
-void SessionReports::publish(const PlaceList& places, const std::vector<EncoderChoice>& encoders,
-                             Metrics& metrics) {
+void SessionReports::publish(const SessionList& sessions,
+                             const std::vector<EncoderChoice>& encoders, Metrics& metrics) {
   auto reports = std::make_shared<std::vector<SessionReport>>();
-  reports->reserve(places.size());
+  reports->reserve(sessions.size());
   std::size_t queued = 0;
   std::size_t spectators = 0;
   int in_flight = 0;
@@ -111,15 +112,15 @@ void SessionReports::publish(const PlaceList& places, const std::vector<EncoderC
   int stepped_down = 0;
   double target_bits_per_s = 0.0;
   std::map<EncoderKind, int> encoding;
-  for (const auto& place : places) {
-    const Visit& visit = place->visit();
-    const SessionReport& report = reports->emplace_back(*place);
+  for (const auto& session : sessions) {
+    const Visit& visit = session->visit();
+    const SessionReport& report = reports->emplace_back(*session);
     if (visit.life().state() == VisitState::live && !visit.life().lost()) {
       stepped_down += report.steps_down > 0 ? 1 : 0;
       target_bits_per_s += 1e3 * report.target_bitrate_kbps;
       metrics.link_queue_seconds.Observe(std::chrono::duration<double>(report.queue_delay).count());
     }
-    if (place->visitor().admitted_at) ++encoding[place->visitor().encoder.kind];
+    if (session->visitor().admitted_at) ++encoding[session->visitor().encoder.kind];
     queued += report.frames_queued;
     lost += visit.life().lost() ? 1 : 0;
     spectators += report.spectators;

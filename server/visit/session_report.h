@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "server/visit/place.h"
+#include "server/visit/session.h"
 
 namespace catgs {
 
 /// One session's entry in /api/sessions. Capturing it is cheap, because the session thread is busy
 /// with frames. The reader's thread formats it.
 struct SessionReport {
-  explicit SessionReport(Place& place);
+  explicit SessionReport(Session& session);
 
   std::string id;
   std::string_view state;
@@ -32,7 +32,7 @@ struct SessionReport {
   int target_bitrate_kbps;
   std::size_t steps_down;
   LinkState link;
-  std::size_t frames_queued;
+  std::size_t frames_queued = 0;
   SessionUsage usage;
 };
 
@@ -40,7 +40,7 @@ struct SessionReport {
 class SessionReports {
  public:
   /// Session thread. Call it four times a second.
-  void publish(const PlaceList& places, const std::vector<EncoderChoice>& encoders,
+  void publish(const SessionList& sessions, const std::vector<EncoderChoice>& encoders,
                Metrics& metrics);
   /// Any thread. Returns the last publication as a JSON array.
   [[nodiscard]] std::string json() const;

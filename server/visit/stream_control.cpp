@@ -6,6 +6,15 @@
 #include "render_core/base/build_info.h"
 
 namespace catgs {
+namespace {
+
+void describe_pictures(StreamConfig& config, glm::ivec2 size_px, const EncoderSettings& moving) {
+  config.size_px = size_px;
+  config.fps = moving.fps;
+  config.bitrate_kbps = moving.bitrate_kbps;
+}
+
+}  // namespace
 
 bool StreamControl::begin(Admission admission, const Hello& hello) {
   const bool goes_on = admission.scene == scene_ && admission.encoder.kind == encoder_.kind;
@@ -13,7 +22,7 @@ bool StreamControl::begin(Admission admission, const Hello& hello) {
   enter_scene(std::move(admission.scene));
   plan_.begin(hello, admission.effort, admission.pixel_share);
   idr_.begin();
-  if (goes_on) describe_plan();
+  if (goes_on) describe_pictures(config_, plan_.moving().size_px, plan_.moving());
   return goes_on;
 }
 
@@ -35,14 +44,8 @@ void StreamControl::open() {
   outdated_ = !ready();
   if (outdated_) return;
   use_ = Use::opening;
-  describe_plan();
+  describe_pictures(config_, plan_.moving().size_px, plan_.moving());
   host_.open_stream({scene_->renderer, encoder_.kind, plan_.moving()});
-}
-
-void StreamControl::describe_plan() {
-  config_.size_px = plan_.moving().size_px;
-  config_.fps = plan_.moving().fps;
-  config_.bitrate_kbps = plan_.moving().bitrate_kbps;
 }
 
 void StreamControl::on_opened(const StreamOpened& opened) {
@@ -99,9 +102,7 @@ void StreamControl::end_frame() {
 bool StreamControl::describe(const FrameResult& made) {
   if (!made.frame.ticket.idr) return false;
   StreamConfig config = config_;
-  config.size_px = made.frame.ticket.size_px;
-  config.fps = described_.fps;
-  config.bitrate_kbps = described_.bitrate_kbps;
+  describe_pictures(config, made.frame.ticket.size_px, described_);
   config.codec_string = made.codec_string;
   return std::exchange(config_, config) != config;
 }
@@ -120,19 +121,18 @@ bool StreamControl::mend(const FrameResult& failed) {
 }
 
 ServerMessage StreamControl::introduction() {
-  if (std::exchange(welcome_due_, false)) return welcome();
+  if (std::exchange(welcome_due_, false)) return welcome_to(*this, host_);
   return config_;
 }
 
-Welcome StreamControl::welcome() const {
-  assert(scene_);
+Welcome welcome_to(const StreamControl& stream, VisitHost& host) {
+  assert(stream.scene());
   Welcome welcome;
-  welcome.scene = scene_->facts;
-  welcome.config = config_;
-  welcome.renderer = scene_->renderer_text;
+  welcome.scene = stream.scene()->facts;
+  welcome.config = stream.config();
+  welcome.renderer = stream.scene()->renderer_text;
   welcome.server_version = build_version;
-  welcome.scene_ids = host_.scene_ids();
-  host_.sign(welcome);
+  host.sign(welcome);
   return welcome;
 }
 

@@ -41,8 +41,6 @@ class StreamControl {
   void owe_welcome() { welcome_due_ = true; }
   /// The next message about the stream: a welcome if one is due.
   [[nodiscard]] ServerMessage introduction();
-  /// The first message to a client. Requires an opened stream.
-  [[nodiscard]] Welcome welcome() const;
 
   [[nodiscard]] bool opening() const { return use_ == Use::opening; }
   [[nodiscard]] bool ready() const { return use_ == Use::none; }
@@ -67,7 +65,6 @@ class StreamControl {
   enum class Use { none, opening, drawing };
 
   bool change_encoder(Fault why);
-  void describe_plan();
 
   VisitHost& host_;
   PicturePlan plan_;
@@ -86,5 +83,8 @@ class StreamControl {
   StreamConfig config_;
   bool welcome_due_ = false;  // the scene is new to the client
 };
+
+/// The first message to a client of this stream, which is open.
+[[nodiscard]] Welcome welcome_to(const StreamControl& stream, VisitHost& host);
 
 }  // namespace catgs

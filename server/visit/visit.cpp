@@ -102,7 +102,7 @@ void Visit::ask_again(TimePoint now) {
     return fail(error->code, error->message);
   awaited_scene_.reset();
   life_.enter(VisitState::queued);
-  if (const auto* place = std::get_if<QueuePlace>(&answer)) return say(*place, now);
+  if (const auto* position = std::get_if<QueuePlace>(&answer)) return say(*position, now);
   if (const auto* awaited = std::get_if<SceneAwaited>(&answer))
     return await_scene(hello_.scene_id, *awaited, now);
   life_.enter(VisitState::opening);
@@ -209,7 +209,7 @@ void Visit::on_frame(FrameResult result, TimePoint now) {
   statistics_.frames_lost(dropped.size());
 }
 
-void Visit::on_tick(TimePoint now, bool outdated) {
+void Visit::on_tick(TimePoint now, int sessions, bool outdated) {
   if (life_.hello_is_late(now))
     return fail(ErrorCode::bad_message, "no hello within the time limit");
   if (awaited_scene_ && !life_.lost()) {
@@ -229,7 +229,7 @@ void Visit::on_tick(TimePoint now, bool outdated) {
     if (idle->fatal) return fail(idle->code, idle->message);
     say(*idle, now);
   }
-  if (const auto stats = statistics_.take(flow_, host_.session_count(), now)) say(*stats, now);
+  if (const auto stats = statistics_.take(flow_, sessions, now)) say(*stats, now);
   if (now - last_said_ >= speak_at_least_every) say(heartbeat_at(now), now);
 }
 

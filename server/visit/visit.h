@@ -30,12 +30,10 @@ class Visit {
   void on_message(const ClientMessage& message, TimePoint now);
   void on_stream_opened(const StreamOpened& opened, TimePoint now);
   void on_frame(FrameResult result, TimePoint now);
-  void on_link(const LinkState& link, TimePoint now) { flow_.observed(link, now); }
-  void on_frame_sent(std::size_t bytes) { statistics_.frame_sent(bytes); }
   /// Call it at least four times a second. Handles timeouts, statistics and the heartbeat.
-  /// `outdated`: the last picture would look better now.
-  void on_tick(TimePoint now, bool outdated = false);
-  /// Asks for admission again. Only while the visit waits for a place.
+  /// `sessions`: of the server. `outdated`: the last picture would look better now.
+  void on_tick(TimePoint now, int sessions = 1, bool outdated = false);
+  /// Asks for admission again. Only while the visit waits for a slot.
   void ask_again(TimePoint now);
   /// The connection was lost without a farewell. The visit closes after the grace period.
   void on_lost(TimePoint now);
@@ -60,9 +58,9 @@ class Visit {
   [[nodiscard]] const Hello& waiting_hello() const { return hello_; }
   [[nodiscard]] StreamControl& stream() { return stream_; }
   [[nodiscard]] const StreamControl& stream() const { return stream_; }
-  [[nodiscard]] const FlowControl& flow() const { return flow_; }
+  [[nodiscard]] FlowControl& flow() { return flow_; }
   [[nodiscard]] std::chrono::microseconds frame_interval() const { return frames_.interval(); }
-  [[nodiscard]] const VisitStatistics& statistics() const { return statistics_; }
+  [[nodiscard]] VisitStatistics& statistics() { return statistics_; }
 
  private:
   /// Handles a message from an admitted client.

@@ -29,7 +29,7 @@ struct VisitOptions {
   int cpus = 1;      // available for encoding
   EffortControl::Range presets;
   int max_sessions_per_address = 64;  // a museum behind one address
-  int max_queue = 64;                 // clients that wait for a place
+  int max_queue = 64;                 // clients that wait for a slot
   int max_spectators = 16;            // per session
   int max_greeting = 64;              // further connections without an accepted hello
   std::function<std::int64_t()> wall_clock_s = unix_now_s;  // for tokens; may jump, also backwards

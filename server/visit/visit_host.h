@@ -35,9 +35,7 @@ class VisitHost {
   virtual ~VisitHost() = default;
   virtual AdmissionAnswer admit(const Hello& hello) = 0;
   virtual SceneAnswer find_scene(const std::string& scene_id) = 0;
-  virtual std::vector<std::string> scene_ids() = 0;
-  virtual std::uint32_t session_count() = 0;
-  /// Fills in the id of the session and the welcome's tokens.
+  /// Fills in the scenes that the client may select, the id of the session and its tokens.
   virtual void sign(Welcome& welcome) = 0;
   virtual void send(const ServerMessage& message) = 0;
   /// Returns the ids of the frames that were dropped to make room.

@@ -13,7 +13,7 @@ struct VisitPolicy {
   std::chrono::milliseconds idle_timeout{15 * 60 * 1000};  // 0: never
   std::chrono::milliseconds idle_warning{30'000};          // before the timeout
   std::chrono::milliseconds resume_grace{30'000};  // a lost client may come back for so long
-  std::chrono::milliseconds longest_wait{10 * 60 * 1000};  // for a place
+  std::chrono::milliseconds longest_wait{10 * 60 * 1000};  // for a slot
   /// A client that has waited for so long is not overtaken any more by those who ask for less.
   std::chrono::milliseconds overtaken_at_most{30'000};
   int default_fps = 60;

@@ -29,8 +29,7 @@ void VisitStatistics::frames_lost(std::size_t count) {
   stats_.dropped_packets += static_cast<std::uint32_t>(count);
 }
 
-std::optional<Stats> VisitStatistics::take(const FlowControl& flow, std::uint32_t sessions,
-                                           TimePoint now) {
+std::optional<Stats> VisitStatistics::take(const FlowControl& flow, int sessions, TimePoint now) {
   if (now - second_start_ < 1s) return std::nullopt;
   const float seconds = std::chrono::duration<float>(now - second_start_).count();
   second_start_ = now;
@@ -38,10 +37,10 @@ std::optional<Stats> VisitStatistics::take(const FlowControl& flow, std::uint32_
   Stats stats = std::exchange(stats_, {});
   stats.fps = static_cast<float>(std::exchange(second_frames_, 0)) / seconds;
   stats.bitrate_kbps = static_cast<float>(std::exchange(second_bytes_, 0)) * 8e-3f / seconds;
-  stats.sessions = sessions;
+  stats.sessions = static_cast<std::uint32_t>(sessions);
   stats.target_bitrate_kbps = flow.bitrate_kbps();
   stats.target_fps = static_cast<int>(1s / flow.frame_interval());
-  stats.steps_down = static_cast<std::uint32_t>(flow.steps_down());
+  stats.steps_down = static_cast<std::uint32_t>(flow.ladder().steps_down());
   stats.queue_delay_us = static_cast<std::uint32_t>(flow.queue_delay().count());
   stats.rtt_us = static_cast<std::uint32_t>(flow.credit().base_rtt().count());
   return stats;

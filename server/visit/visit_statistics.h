@@ -26,7 +26,7 @@ class VisitStatistics {
   void frame_dropped_by_client() { ++frames_dropped_; }
   /// The Stats message, once a second while frames are sent. `sessions` counts all sessions of the
   /// server.
-  std::optional<Stats> take(const FlowControl& flow, std::uint32_t sessions, TimePoint now);
+  std::optional<Stats> take(const FlowControl& flow, int sessions, TimePoint now);
 
   [[nodiscard]] std::uint64_t frames_sent() const { return frames_sent_; }
   [[nodiscard]] std::uint64_t frames_dropped() const { return frames_dropped_; }

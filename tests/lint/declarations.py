@@ -19,10 +19,7 @@ MAX_FIELDS = 20
 LONGER_FUNCTIONS = {
     "tests/render_core/scene/formats/encoders.cpp: encode_sog": 101,
 }
-MORE_METHODS = {
-    "Audience": 25, "FlowControl": 25, "Place": 25, "Places": 25, "StreamControl": 25,
-    "TreeShape": 25, "Visit": 25,
-}
+MORE_METHODS = {}
 MORE_FIELDS = {}
 # Classes of many fields, since each is a row of a table.
 TABLES = {

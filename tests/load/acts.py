@@ -186,7 +186,7 @@ def says_and_leaves(address: Address, link: str, messages: list[bytes]) -> str:
 def all_acts(link: str = "") -> list[Act]:
     """At a server that asks for no tokens, or at one where `link` is an author's."""
     stops = [field(13, field(1, i % 32) + field(2, i % 256)) for i in range(FLOOD_MESSAGES)]
-    # Of those that begin, eight may come at once: shared_tours_ in server/visit/place.cpp.
+    # Of those that begin, eight may come at once: shared_tours in server/visit/session.h.
     # The others are refused once a second, so a flood makes one line, and two when it is held up.
     presents = [field(11, field(1, on) + field(2, f"leader {i}")) for i in range(20) for on in (1, 0)]
     acts = [Act("forged stops", lambda address: says_and_leaves(address, link, stops)),

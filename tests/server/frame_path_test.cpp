@@ -1,11 +1,11 @@
 #include "server/frame_path.h"
 
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
 
-struct FramePathTest : PlacesTest {
+struct FramePathTest : SessionsTest {
   FramePathTest() {
     options.max_sessions = options.max_sessions_per_address = 100;
     options.policy.still_after = 1h;  // nothing is drawn but for a pose
@@ -13,7 +13,7 @@ struct FramePathTest : PlacesTest {
   /// Everybody has a picture, nothing is due any more, and no tick comes from here on.
   void settle() {
     move_on(1);
-    places->stop_timer();
+    sessions->stop_timer();
     do {
       for (Visitor& visitor : clients) acknowledge(visitor);
       frame_path->asked.clear();

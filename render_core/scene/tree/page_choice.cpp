@@ -157,7 +157,7 @@ void PageChoice::failed(const PageOfTree& page) {
 }
 
 PageOfTree PageChoice::family_of(const PageOfTree& page) const {
-  return {page.tree, trees_.at(page.tree)->family_of(page.page)};
+  return {page.tree, catgs::family_of(*trees_.at(page.tree), page.page)};
 }
 
 std::optional<PageOfTree> PageChoice::above(const PageOfTree& first) const {
@@ -169,7 +169,7 @@ std::optional<PageOfTree> PageChoice::above(const PageOfTree& first) const {
 }
 
 void PageChoice::append(const PageOfTree& first, std::vector<PageOfTree>& pages) const {
-  const std::uint32_t size = trees_.at(first.tree)->family_size(first.page);
+  const std::uint32_t size = family_size(*trees_.at(first.tree), first.page);
   for (std::uint32_t i = 0; i < size; ++i) pages.push_back({first.tree, first.page + i});
 }
 

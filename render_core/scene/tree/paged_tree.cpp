@@ -89,7 +89,7 @@ std::span<const PagedTree::Seen> PagedTree::look() {
         table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity());
     // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
-      return broken_.contains(shape().family_of(use.page));
+      return broken_.contains(family_of(shape(), use.page));
     });
     seen_.push_back({std::move(watch), number, demand.at_once, std::move(cut)});
   }
@@ -103,7 +103,7 @@ std::vector<std::uint64_t> PagedTree::change(const PageChanges& changes, ThreadP
     for (std::size_t i = 0; i < loaded.size(); ++i)
       if (!loaded[i]) {
         failed.push_back(changes.load[i]);
-        broken_.insert(shape().family_of(changes.load[i]));
+        broken_.insert(family_of(shape(), changes.load[i]));
       }
     publish(loaded, changes.drop);
   }
@@ -156,9 +156,9 @@ std::vector<PagedTree::Page> PagedTree::read(std::span<const std::uint64_t> numb
                        [&](std::size_t i) { pages[i] = read(numbers[i], slots[i]); });
   std::unordered_set<std::uint64_t> broken;  // families
   for (std::size_t i = 0; i < pages.size(); ++i)
-    if (!pages[i]) broken.insert(shape().family_of(numbers[i]));
+    if (!pages[i]) broken.insert(family_of(shape(), numbers[i]));
   for (std::size_t i = 0; i < pages.size(); ++i)
-    if (broken.contains(shape().family_of(numbers[i]))) pages[i].reset();
+    if (broken.contains(family_of(shape(), numbers[i]))) pages[i].reset();
   return pages;
 }
 

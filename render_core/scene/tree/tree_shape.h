@@ -93,15 +93,6 @@ class TreeShape {
     return {static_cast<std::uint8_t>(top_level(band)),
             static_cast<std::uint32_t>(page - first_page_[static_cast<std::size_t>(band)])};
   }
-  /// Pages come and go by family: the one or two pages that refine one node. The first of them.
-  [[nodiscard]] std::uint64_t family_of(std::uint64_t page) const {
-    return root_of(page).index % 2 == 1 ? page - 1 : page;
-  }
-  /// The pages of the family that begins with `first`.
-  [[nodiscard]] std::uint32_t family_size(std::uint64_t first) const {
-    const NodeId root = root_of(first);
-    return root.index + 1 < nodes_on(root.level) ? 2 : 1;
-  }
 
   // --- Nodes in pages ---
   [[nodiscard]] std::uint64_t page_of(NodeId node) const {
@@ -144,6 +135,17 @@ class TreeShape {
 inline NodeId refined_by(const TreeShape& shape, std::uint64_t page) {
   const NodeId root = shape.root_of(page);
   return {static_cast<std::uint8_t>(root.level + 1), root.index / 2};
+}
+
+/// Pages come and go by family: the one or two pages that refine one node. The first of them.
+inline std::uint64_t family_of(const TreeShape& shape, std::uint64_t page) {
+  return shape.root_of(page).index % 2 == 1 ? page - 1 : page;
+}
+
+/// The pages of the family that begins with `first`.
+inline std::uint32_t family_size(const TreeShape& shape, std::uint64_t first) {
+  const NodeId root = shape.root_of(first);
+  return root.index + 1 < shape.nodes_on(root.level) ? 2 : 1;
 }
 
 /// Calls visit(node) for each node of a page, the root first. The page's other slots are unused.

@@ -127,7 +127,7 @@ void fill(Stores& stores, TreeFile& tree) {
   const TreeShape& shape = tree.shape();
   std::uint32_t size = 0;
   for (std::uint64_t first = 0; first < tree.pages_in_file(); first += size) {
-    size = shape.family_size(first);
+    size = family_size(shape, first);
     const NodeFacts* above = stores.table.facts_above(first);
     if (first > 0 && !above) continue;
     std::vector<std::unique_ptr<const TreePage>> family;

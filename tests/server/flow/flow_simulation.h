@@ -165,7 +165,7 @@ class FlowSimulation {
     sample.client_time_us = client_.clock_us(sampled);
     sample.world_from_camera.position.x = x_;
     sample.fov_y_rad = 1.0f;
-    visit_.on_link(link_state(), at(now_));
+    visit_.flow().observed(link_state(), at(now_));
     visit_.on_message(sample, at(now_));
   }
 
@@ -176,7 +176,7 @@ class FlowSimulation {
       acks_.pop_front();
       if (!ack.dropped)
         presented_.push_back({now_ - scenario_.link.delay, microseconds(ack.pose_age_us)});
-      visit_.on_link(link_state(), at(now_));
+      visit_.flow().observed(link_state(), at(now_));
       visit_.on_message(ack, at(now_));
     }
   }
@@ -219,7 +219,7 @@ class FlowSimulation {
     trace.arrival = link_.send(trace.bytes, now_);
     trace.queueing = trace.arrival - trace.sent - scenario_.link.delay;
     client_.receive(trace.ticket, trace.arrival);
-    visit_.on_frame_sent(trace.bytes);
+    visit_.statistics().frame_sent(trace.bytes);
     frames_.push_back(trace);
   }
 

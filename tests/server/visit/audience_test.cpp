@@ -65,26 +65,26 @@ TEST_F(AudienceTest, APresentationEndsWithItsScene) {
     audience.send(welcome, now);
   };
   enter("hall");
-  audience.presentation().begin({true, "Ada"}, now);
+  audience.tour().begin({true, "Ada"}, now);
   const auto spectator = join();
   enter("hall");  // the leader comes back
-  EXPECT_TRUE(audience.presentation().since());
+  EXPECT_TRUE(audience.tour().since());
   EXPECT_FALSE(spectator->closed);
   enter("attic");
-  EXPECT_FALSE(audience.presentation().since());
+  EXPECT_FALSE(audience.tour().since());
   EXPECT_TRUE(spectator->closed) << "it may not be allowed to see that";
 }
 
 TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
   const auto connection = std::make_shared<FakeConnection>();
   const auto follower = std::make_shared<ClientConnection>(io, metrics, connection, [] {});
-  audience.presentation().begin({true, "Ada"}, now);
-  audience.presentation().add(follower);
+  audience.tour().begin({true, "Ada"}, now);
+  audience.tour().add(follower);
   const auto told = [&](bool at_rest) {
     const int before = connection->messages;
     PoseSample camera;
     camera.at_rest = at_rest;
-    for (int i = 0; i < 100; ++i) audience.presentation().moved(camera, now += 10us);
+    for (int i = 0; i < 100; ++i) audience.tour().moved(camera, now += 10us);
     return connection->messages - before;
   };
   EXPECT_EQ(told(false), 1);
@@ -96,7 +96,7 @@ TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
   for (int i = 0; i < 600; ++i) {
     PoseSample camera;
     camera.at_rest = i % 2 == 0;
-    audience.presentation().moved(camera, now += 1667us);
+    audience.tour().moved(camera, now += 1667us);
   }
   EXPECT_LE(connection->messages - before, 32);
 }
@@ -141,7 +141,7 @@ TEST_F(AudienceTest, EndsWithTheSession) {
   const auto second = join();
   audience.remove(*spectators[0]);
   EXPECT_EQ(audience.spectators(), 1u);
-  audience.end_presentation();
+  audience.end_tour();
   EXPECT_EQ(second->closed, CloseCode::normal);
   EXPECT_FALSE(first->closed);
   EXPECT_EQ(audience.spectators(), 0u);

@@ -2,18 +2,18 @@
 
 #include <thread>
 
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
 
-using ClientConnectionTest = PlacesTest;
+using ClientConnectionTest = SessionsTest;
 
 TEST_F(ClientConnectionTest, TakesMessagesAtTheirRate) {
   start();
   const TimePoint start = Clock::now();
   Visitor& visitor = clients.emplace_back(Visitor{
-      std::make_shared<OpenConnection>(), places->accept(std::make_shared<OpenConnection>())});
+      std::make_shared<OpenConnection>(), sessions->accept(std::make_shared<OpenConnection>())});
   for (int i = 0; i < 1200; ++i) move(visitor);
   EXPECT_EQ(metrics.poses_received.Value(), 1200.0);
   std::this_thread::sleep_for(250ms);
@@ -26,7 +26,7 @@ TEST_F(ClientConnectionTest, TakesMessagesAtTheirRate) {
 TEST_F(ClientConnectionTest, RefusesAFloodOnce) {
   start();
   auto connection = std::make_shared<OpenConnection>();
-  Visitor& flooding = clients.emplace_back(Visitor{connection, places->accept(connection)});
+  Visitor& flooding = clients.emplace_back(Visitor{connection, sessions->accept(connection)});
   flooding.listener->on_flood();
   move(flooding);
   flooding.listener->on_flood();

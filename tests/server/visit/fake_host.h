@@ -41,8 +41,6 @@ struct FakeHost final : VisitHost {
     if (scene_awaited) return SceneAwaited{5s};
     return named_scene(id);
   }
-  std::vector<std::string> scene_ids() override { return {"a"}; }
-  std::uint32_t session_count() override { return 1; }
   void sign(Welcome& welcome) override {
     welcome.session_id = "test";
     welcome.resume_token = "again";

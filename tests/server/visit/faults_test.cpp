@@ -3,14 +3,14 @@
 
 #include <future>
 
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
 
 using testing::HasSubstr;
 
-class Faults : public PlacesTest {
+class Faults : public SessionsTest {
  protected:
   void only_x264() { encoders = {{EncoderKind::x264, Codec::h264, "libx264"}}; }
   [[nodiscard]] int failed_frames() const {

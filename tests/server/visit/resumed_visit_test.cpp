@@ -1,4 +1,4 @@
-// A session that waits for its place, loses its client, gets it back: with a fake clock.
+// A session that waits for its slot, loses its client, gets it back: with a fake clock.
 
 #include "tests/server/visit/visit_fixture.h"
 
@@ -22,7 +22,7 @@ class SessionLife : public test::VisitTest {
 };
 
 TEST_F(SessionLife, WaitsForAPlaceAndSpeaksMeanwhile) {
-  const AdmissionAnswer place = std::exchange(host.admission, QueuePlace{3, 40s});
+  const AdmissionAnswer granted = std::exchange(host.admission, QueuePlace{3, 40s});
   Hello hello = resuming();
   session.on_message(hello, now);
   EXPECT_EQ(session.life().state(), VisitState::queued);
@@ -39,7 +39,7 @@ TEST_F(SessionLife, WaitsForAPlaceAndSpeaksMeanwhile) {
   session.say(QueuePlace{1, 10s}, now);
   EXPECT_EQ(std::get<QueuePlace>(host.said.back()).position, 1);
 
-  host.admission = place;
+  host.admission = granted;
   session.ask_again(now);
   EXPECT_EQ(session.life().state(), VisitState::opening);
   ASSERT_EQ(host.opened.size(), 1u);

@@ -62,7 +62,7 @@ class VisitTest : public testing::Test {
     result.sharp = sharp;
     const bool dropped = std::ranges::count(host.drop_next, order.ticket.frame_id) > 0;
     session.on_frame(std::move(result), now);
-    if (leaves && !dropped) session.on_frame_sent(100);
+    if (leaves && !dropped) session.statistics().frame_sent(100);
   }
   void ack(std::uint64_t id) {
     Ack message;

@@ -147,7 +147,7 @@ TEST_F(VisitTest, CountsAFrameOnceItHasLeft) {
   pose(1, 0.0f);
   run_frame(false);
   EXPECT_EQ(session.statistics().frames_sent(), 0u) << "it waits for the socket";
-  session.on_frame_sent(123);
+  session.statistics().frame_sent(123);
   EXPECT_EQ(session.statistics().frames_sent(), 1u);
   EXPECT_EQ(session.statistics().bytes_sent(), 123u);
 }

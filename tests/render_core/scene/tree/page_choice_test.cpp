@@ -45,8 +45,8 @@ class Memory {
     std::ranges::reverse(path);
     for (std::size_t i = 0; i < path.size(); ++i) {
       const float error = error_px * std::pow(2.0f, static_cast<float>(path.size() - 1 - i));
-      const std::uint64_t first = shape_.family_of(path[i]);
-      for (std::uint64_t p = first; p < first + shape_.family_size(first); ++p)
+      const std::uint64_t first = family_of(shape_, path[i]);
+      for (std::uint64_t p = first; p < first + family_size(shape_, first); ++p)
         (holds(p, tree) ? cut.used : cut.missing).push_back({p, error});
       if (!holds(path[i], tree)) return;
     }
@@ -100,10 +100,10 @@ TEST(PageChoice, LargestErrorsAreLoadedFirst) {
   memory.want(5, 3.0f, cut);
   const PageChoice::Step step = memory.turn(cut, 4);
   const TreeShape& shape = memory.shape();
-  EXPECT_EQ(step.load, (std::vector<PageOfTree>{{0, shape.family_of(3)},
-                                                {0, shape.family_of(3) + 1},
-                                                {0, shape.family_of(5)},
-                                                {0, shape.family_of(5) + 1}}));
+  EXPECT_EQ(step.load, (std::vector<PageOfTree>{{0, family_of(shape, 3)},
+                                                {0, family_of(shape, 3) + 1},
+                                                {0, family_of(shape, 5)},
+                                                {0, family_of(shape, 5) + 1}}));
   EXPECT_TRUE(step.drop.empty());
 }
 

@@ -34,8 +34,8 @@ TEST(TreeShape, EveryNodeHasASlotOfItsOwnBesideItsFamily) {
             ASSERT_EQ(slot, 0u);
             ASSERT_LT(shape.page_of(parent), page);  // coarse pages come first
             const std::uint64_t first = shape.page_of({node.level, i / 2 * 2});
-            ASSERT_EQ(shape.family_of(page), first);
-            ASSERT_EQ(shape.family_size(first), i / 2 * 2 + 1 < shape.nodes_on(level) ? 2u : 1u);
+            ASSERT_EQ(family_of(shape, page), first);
+            ASSERT_EQ(family_size(shape, first), i / 2 * 2 + 1 < shape.nodes_on(level) ? 2u : 1u);
           }
         }
       EXPECT_EQ(shape.nodes_on(shape.levels() - 1), 1u);

@@ -1,4 +1,4 @@
-#include "server/visit/presentation.h"
+#include "server/visit/shared_tour.h"
 
 #include <algorithm>
 #include <chrono>
@@ -13,8 +13,8 @@ using namespace std::chrono_literals;
 
 // Enough for a smooth way between two of them. Followers draw at their own rate.
 constexpr auto between_cameras = 33ms;
-constexpr auto between_places = 500ms;
-// Of all in the company. Each may send two a second (Place).
+constexpr auto between_positions = 500ms;
+// From all participants. Each may send two a second (Session).
 constexpr double pings_per_second = 10.0;
 
 bool same_but_for_camera(const Lead& a, const Lead& b) {
@@ -24,7 +24,7 @@ bool same_but_for_camera(const Lead& a, const Lead& b) {
 
 }  // namespace
 
-void Presentation::begin(const Present& wish, TimePoint now) {
+void SharedTour::begin(const Present& wish, TimePoint now) {
   if (!since_) {
     since_ = now;
     pings_.emplace(pings_per_second, pings_per_second, now);
@@ -32,43 +32,44 @@ void Presentation::begin(const Present& wish, TimePoint now) {
   wish_ = wish;
 }
 
-void Presentation::end(bool elsewhere) {
+void SharedTour::end(bool elsewhere) {
   if (!std::exchange(since_, {})) return;
   tell_followers(
       Lead{.state = LeadState::ended, .name = wish_.name, .camera = {}, .elsewhere = elsewhere});
   followers_.clear();
   told_.reset();
   camera_.reset();
-  places_told_ = {};
+  positions_told_ = {};
 }
 
-void Presentation::add(const std::shared_ptr<ClientConnection>& follower) {
+void SharedTour::add(const std::shared_ptr<ClientConnection>& follower) {
   remove(*follower);
   followers_.push_back(follower);
   Lead now = told_.value_or(Lead{LeadState::leads, wish_.name, followers_.size(), {}, wish_.pings});
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
-  if (!places_told_.places.empty()) follower->connection().send(wire::serialize(places_told_));
+  if (!positions_told_.places.empty())
+    follower->connection().send(wire::serialize(positions_told_));
 }
 
-void Presentation::remove(const ClientConnection& follower) {
+void SharedTour::remove(const ClientConnection& follower) {
   std::erase_if(followers_, [&](const auto& known) {
     const auto connection = known.lock();
     return !connection || connection.get() == &follower;
   });
 }
 
-std::size_t Presentation::followers() const {
+std::size_t SharedTour::followers() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(followers_, [](const auto& follower) { return !follower.expired(); }));
 }
 
-bool Presentation::has(const ClientConnection& follower) const {
+bool SharedTour::has(const ClientConnection& follower) const {
   return std::ranges::any_of(followers_,
                              [&](const auto& known) { return known.lock().get() == &follower; });
 }
 
-void Presentation::moved(const PoseSample& camera, TimePoint now) {
+void SharedTour::moved(const PoseSample& camera, TimePoint now) {
   const bool stops = camera.at_rest && !(camera_ && camera_->at_rest);
   camera_ = camera;
   camera_is_new_ = true;
@@ -76,7 +77,7 @@ void Presentation::moved(const PoseSample& camera, TimePoint now) {
   if (now >= next_camera_ - (stops ? between_cameras : 0ms)) tell_camera(now);
 }
 
-std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePoint now) {
+std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoint now) {
   if (!since_) return std::nullopt;
   Lead lead{away ? LeadState::away : LeadState::leads,
             wish_.name,
@@ -92,28 +93,28 @@ std::optional<Lead> Presentation::news(std::size_t spectators, bool away, TimePo
   return lead;
 }
 
-bool Presentation::ping(const Pinged& pinged, TimePoint now) {
+bool SharedTour::ping(const Pinged& pinged, TimePoint now) {
   if (!since_ || !(pinged.by_leader || wish_.pings) || !pings_->take(now)) return false;
   tell_followers(pinged);
   return true;
 }
 
-bool Presentation::tell(const Company& company, TimePoint now) {
-  if (company == places_told_) return false;
-  if (places_told_at_ && now - *places_told_at_ < between_places) return false;
-  places_told_ = company;
-  places_told_at_ = now;
+bool SharedTour::tell(const Company& company, TimePoint now) {
+  if (company == positions_told_) return false;
+  if (positions_told_at_ && now - *positions_told_at_ < between_positions) return false;
+  positions_told_ = company;
+  positions_told_at_ = now;
   tell_followers(company);
   return true;
 }
 
-void Presentation::tell_followers(const ServerMessage& message) const {
+void SharedTour::tell_followers(const ServerMessage& message) const {
   const OutgoingMessage outgoing = wire::serialize(message);
   for (const auto& known : followers_)
     if (const auto follower = known.lock()) follower->connection().send(outgoing);
 }
 
-void Presentation::tell_camera(TimePoint now) {
+void SharedTour::tell_camera(TimePoint now) {
   next_camera_ = std::max(next_camera_, now) + between_cameras;
   camera_is_new_ = false;
   if (!since_ || followers_.empty()) return;

@@ -10,16 +10,16 @@
 
 namespace catgs {
 
-/// A visit that leads others: its followers, and what they receive. Followers have visits of their
-/// own and get the leader's camera. Session thread only.
-class Presentation {
+/// A tour that a visit hosts: its followers, and what they receive. Followers have visits of their
+/// own and get the host's camera. Session thread only.
+class SharedTour {
  public:
   void begin(const Present& wish, TimePoint now);
-  /// Tells the followers that it is over here. `elsewhere`: the leader is in another scene.
+  /// Tells the followers that it is over here. `elsewhere`: the host is in another scene.
   void end(bool elsewhere = false);
-  /// The leader gave this name when it began to present; empty: it gave none.
+  /// The host gave this name when it began the tour; empty: it gave none.
   [[nodiscard]] const std::string& name() const { return wish_.name; }
-  /// When it began; nothing: the visit leads nobody.
+  /// When it began; nothing: the visit hosts no tour.
   [[nodiscard]] std::optional<TimePoint> since() const { return since_; }
 
   void add(const std::shared_ptr<ClientConnection>& follower);
@@ -28,7 +28,7 @@ class Presentation {
   [[nodiscard]] std::size_t followers() const;
   [[nodiscard]] bool has(const ClientConnection& follower) const;
 
-  /// The leader's camera has moved or has come to rest. Followers hear of it, or of a newer one,
+  /// The host's camera has moved or has come to rest. Followers hear of it, or of a newer one,
   /// within 33 ms or by the next news(), 30 times a second at most.
   void moved(const PoseSample& camera, TimePoint now);
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
@@ -36,19 +36,18 @@ class Presentation {
   std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now);
   /// The visit is in another scene now, where its camera has not been yet.
   void forget_camera() { camera_.reset(); }
-  /// The newest camera of the visit, whether it leads or not.
+  /// The newest camera of the visit, whether it hosts or not.
   [[nodiscard]] const std::optional<PoseSample>& camera() const { return camera_; }
 
-  /// False: whoever points at a place may not, or there were too many pings lately. Tells the
-  /// followers otherwise.
+  /// Tells the followers of a ping. False: it is not allowed, or one of too many.
   bool ping(const Pinged& pinged, TimePoint now);
-  /// Whether the company hears where all in it are.
-  [[nodiscard]] bool tells_places() const { return since_ && wish_.tells_places; }
-  /// Where the company is now. Tells the followers, and returns true for all others, if that is
-  /// new and they heard of it half a second ago or more.
+  /// Whether all participants hear where all are.
+  [[nodiscard]] bool tells_positions() const { return since_ && wish_.tells_places; }
+  /// Where all participants are now. Tells the followers, and returns true for all others, if that
+  /// is new and they heard of it half a second ago or more.
   bool tell(const Company& company, TimePoint now);
-  /// Where the company was when it heard of it last.
-  [[nodiscard]] const Company& places_told() const { return places_told_; }
+  /// Where all participants were when they heard of it last.
+  [[nodiscard]] const Company& positions_told() const { return positions_told_; }
 
  private:
   void tell_followers(const ServerMessage& message) const;
@@ -62,8 +61,8 @@ class Presentation {
   TimePoint next_camera_{};  // followers hear of the camera from then on
   bool camera_is_new_ = false;
   std::optional<RateLimit> pings_;
-  Company places_told_;
-  std::optional<TimePoint> places_told_at_;
+  Company positions_told_;
+  std::optional<TimePoint> positions_told_at_;
 };
 
 }  // namespace catgs

@@ -1,6 +1,6 @@
 #pragma once
 
-// Places with devices and encoders that are not there, and that fail when somebody says so.
+// Sessions with devices and encoders that are not there, and that fail when somebody says so.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@
 #include "render_core/frame/device_error.h"
 #include "server/frame_path.h"
 #include "server/schedule/pool_executor.h"
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 namespace catgs::test {
 
@@ -85,13 +85,13 @@ class PretendedRenderer final : public Renderer {
   [[nodiscard]] std::string description() const override { return "pretended"; }
   [[nodiscard]] std::size_t scene_bytes() const override { return 0; }
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings&) override {
-    return place_view(*devices_, {0, 1}, [this](DeviceSet::Place place) {
-      const auto device = static_cast<std::size_t>(place.device());
+    return place_view(*devices_, {0, 1}, [this](DeviceSet::Slot slot) {
+      const auto device = static_cast<std::size_t>(slot.device());
       if (lost[device]) throw DeviceError(RenderStatus::Code::device_failed, "stream: " + fault);
       if (full[device])
         throw DeviceError(RenderStatus::Code::out_of_memory, "lists: out of memory");
       ++views_made;
-      return std::make_unique<PretendedView>(*this, std::move(place));
+      return std::make_unique<PretendedView>(*this, std::move(slot));
     });
   }
 
@@ -107,11 +107,11 @@ class PretendedRenderer final : public Renderer {
  private:
   class PretendedView final : public View {
    public:
-    PretendedView(PretendedRenderer& renderer, DeviceSet::Place place)
-        : renderer_(renderer), place_(std::move(place)) {}
+    PretendedView(PretendedRenderer& renderer, DeviceSet::Slot slot)
+        : renderer_(renderer), slot_(std::move(slot)) {}
     RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
-      const auto device = static_cast<std::size_t>(place_.device());
-      renderer_.before_frame(place_.device());
+      const auto device = static_cast<std::size_t>(slot_.device());
+      renderer_.before_frame(slot_.device());
       if (renderer_.lost[device])
         return {RenderStatus::Code::device_failed, "blend: " + renderer_.fault};
       if (int left = renderer_.frames_without_memory; left > 0) {
@@ -125,11 +125,11 @@ class PretendedRenderer final : public Renderer {
     }
     [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
     [[nodiscard]] bool outdated() const override { return renderer_.outdated; }
-    [[nodiscard]] std::optional<int> device() const override { return place_.device(); }
+    [[nodiscard]] std::optional<int> device() const override { return slot_.device(); }
 
    private:
     PretendedRenderer& renderer_;
-    DeviceSet::Place place_;
+    DeviceSet::Slot slot_;
   };
 
   const std::shared_ptr<DeviceSet> devices_;
@@ -199,31 +199,31 @@ class PretendedEncoder final : public Encoder {
   bool first_ = true;
 };
 
-/// Counts how often which place was asked for its next frame.
+/// Counts how often which session was asked for its next frame.
 class CountedFrames final : public FramePath {
  public:
   using FramePath::FramePath;
-  void changed(Place& place) override {
-    ++asked[&place];
-    FramePath::changed(place);
+  void changed(Session& session) override {
+    ++asked[&session];
+    FramePath::changed(session);
   }
-  std::map<const Place*, int> asked;
+  std::map<const Session*, int> asked;
 };
 
-class PlacesTest : public testing::Test {
+class SessionsTest : public testing::Test {
  protected:
-  PlacesTest() { options.min_fps = 0; }
+  SessionsTest() { options.min_fps = 0; }
   void start() {
     const auto executor = std::make_shared<PoolExecutor>(
         PoolExecutor::Pools{std::make_shared<ThreadPool>(pool_threads)}, encoder_factory());
     frame_path.emplace(io, executor, static_cast<int>(devices->views().size()), on_devices_lost,
                        metrics);
-    places.emplace(VisitContext{io, options, executor, *devices, *frame_path, scenes, encoders,
-                                authorize, SessionTokens("a key"), metrics, &counts});
+    sessions.emplace(VisitContext{io, options, executor, *devices, *frame_path, scenes, encoders,
+                                  authorize, SessionTokens("a key"), metrics, &counts});
   }
   void TearDown() override {
     for (auto& client : clients) client.listener->on_close(true);
-    if (places) places->stop_timer();
+    if (sessions) sessions->stop_timer();
     io.restart();
     io.run();  // until nothing is under way
     clients.clear();
@@ -253,7 +253,7 @@ class PlacesTest : public testing::Test {
       const std::string& resume_token = {}, const std::string& from = "192.0.2.1",
       const std::function<void(v1::Hello&)>& wish = [](v1::Hello&) {}) {
     auto connection = std::make_shared<OpenConnection>(from);
-    Visitor& visitor = clients.emplace_back(Visitor{connection, places->accept(connection)});
+    Visitor& visitor = clients.emplace_back(Visitor{connection, sessions->accept(connection)});
     v1::ClientMessage message;
     v1::Hello& hello = *message.mutable_hello();
     hello.set_version(1);
@@ -345,7 +345,7 @@ class PlacesTest : public testing::Test {
   VisitCounts counts{unix_now_s};
   std::deque<Visitor> clients;
   std::optional<CountedFrames> frame_path;
-  std::optional<Places> places;
+  std::optional<Sessions> sessions;
 };
 
 }  // namespace catgs::test

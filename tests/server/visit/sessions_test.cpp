@@ -6,12 +6,12 @@
 #include <spdlog/spdlog.h>
 
 #include "server/base/log.h"
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
 
-TEST_F(PlacesTest, NewSessionsGoWhereLessWorkIsMeasured) {
+TEST_F(SessionsTest, NewSessionsGoWhereLessWorkIsMeasured) {
   start();
   renderer->frame_ms[0] = 40.0f;
   renderer->frame_ms[1] = 1.0f;
@@ -26,7 +26,7 @@ TEST_F(PlacesTest, NewSessionsGoWhereLessWorkIsMeasured) {
       << "by their number, one of them would be on device 0";
 }
 
-TEST_F(PlacesTest, WhereNvencDoesNotOpenX264Serves) {
+TEST_F(SessionsTest, WhereNvencDoesNotOpenX264Serves) {
   nvenc_limit = 1;
   start();
   EXPECT_EQ(encoder_of(join()), "h264_nvenc");
@@ -42,7 +42,7 @@ TEST_F(PlacesTest, WhereNvencDoesNotOpenX264Serves) {
   EXPECT_EQ(encoder_of(join()), "h264_nvenc");
 }
 
-TEST_F(PlacesTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
+TEST_F(SessionsTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
   int checks = 0;
   authorize = [&](const auto&) {
     ++checks;
@@ -59,7 +59,7 @@ TEST_F(PlacesTest, ATokenIsCheckedAsOftenHoweverManyScenesThereAre) {
   EXPECT_EQ(checks, for_one_scene);
 }
 
-TEST_F(PlacesTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
+TEST_F(SessionsTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
   options.max_sessions_per_address = 2;
   start();
   const auto admits = [&](const char* from) {
@@ -72,17 +72,17 @@ TEST_F(PlacesTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
               testing::HasSubstr("from 2001:db8:1:2::/64 already"));
   EXPECT_TRUE(admits("2001:db8:1:3::1")) << "a neighbour's";
   for (const std::size_t index : {3u, 2u, 0u}) leave(index);
-  run_until([&] { return places->connections() == 1; });
+  run_until([&] { return sessions->connections() == 1; });
   EXPECT_TRUE(admits("2001:db8:1:2::3")) << "who leaves is counted no more";
 }
 
-TEST_F(PlacesTest, RefusalsAreThoseOfStrangersInTheLog) {
+TEST_F(SessionsTest, RefusalsAreThoseOfStrangersInTheLog) {
   const auto before = spdlog::default_logger();
   testing::internal::CaptureStderr();
   set_up_log("human", "info");
   start();
   for (int i = 0; i < 2000; ++i) {
-    const auto stranger = places->accept(std::make_shared<OpenConnection>("192.0.2.1"));
+    const auto stranger = sessions->accept(std::make_shared<OpenConnection>("192.0.2.1"));
     stranger->on_bad_message("binary messages only");
     stranger->on_close(false);
   }
@@ -99,7 +99,7 @@ TEST_F(PlacesTest, RefusalsAreThoseOfStrangersInTheLog) {
   EXPECT_LT(refusals, 1000);
 }
 
-TEST_F(PlacesTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
+TEST_F(SessionsTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
   start();
   std::set<std::string> ids;
   for (int i = 0; i < 4; ++i) ids.insert(join().connection->welcome->session_id());
@@ -107,7 +107,7 @@ TEST_F(PlacesTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
   EXPECT_THAT(ids, testing::Each(testing::MatchesRegex("[0-9a-f]{32}")));
 }
 
-TEST_F(PlacesTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
+TEST_F(SessionsTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
   start();
   Visitor& visitor = join();
   move(visitor);
@@ -122,7 +122,7 @@ TEST_F(PlacesTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
   run_until([&] { return drawn() > before; });
 }
 
-TEST_F(PlacesTest, RefusesConnectionsBeyondAllPlaces) {
+TEST_F(SessionsTest, RefusesConnectionsBeyondAllPlaces) {
   options.max_sessions = 2;
   options.max_spectators = 3;
   options.max_queue = 4;
@@ -131,7 +131,7 @@ TEST_F(PlacesTest, RefusesConnectionsBeyondAllPlaces) {
   std::vector<std::shared_ptr<OpenConnection>> connections;
   for (int i = 0; i < 2 * (1 + 3) + 4 + 64 + 1; ++i) {
     connections.push_back(std::make_shared<OpenConnection>());
-    clients.emplace_back(Visitor{connections.back(), places->accept(connections.back())});
+    clients.emplace_back(Visitor{connections.back(), sessions->accept(connections.back())});
   }
   run_until([&] { return connections.back()->closed.has_value(); });
   EXPECT_EQ(connections.back()->error->code(), v1::Error::SERVER_FULL);
@@ -139,7 +139,7 @@ TEST_F(PlacesTest, RefusesConnectionsBeyondAllPlaces) {
 }
 
 /// A leader and one who follows.
-class CompanyTest : public PlacesTest {
+class SharedTourTest : public SessionsTest {
  protected:
   void begin(bool pings, bool tells_places) {
     start();
@@ -187,7 +187,7 @@ class CompanyTest : public PlacesTest {
   Visitor* follower = nullptr;
 };
 
-TEST_F(CompanyTest, AllSeeWhereTheLeaderPointsTwiceASecondAtMost) {
+TEST_F(SharedTourTest, AllSeeWhereTheLeaderPointsTwiceASecondAtMost) {
   begin(false, false);
   EXPECT_EQ(heard_of(*leader, 20), 2u);
   const v1::Pinged& last = follower->connection->pinged.back();
@@ -195,7 +195,7 @@ TEST_F(CompanyTest, AllSeeWhereTheLeaderPointsTwiceASecondAtMost) {
   EXPECT_TRUE(last.by_leader());
 }
 
-TEST_F(CompanyTest, FollowersPointWhereTheLeaderLetsThem) {
+TEST_F(SharedTourTest, FollowersPointWhereTheLeaderLetsThem) {
   begin(false, false);
   EXPECT_FALSE(follower->connection->lead->may_ping());
   EXPECT_EQ(heard_of(*follower, 1), 0u);
@@ -207,7 +207,7 @@ TEST_F(CompanyTest, FollowersPointWhereTheLeaderLetsThem) {
   EXPECT_EQ(heard_of(stranger, 1), 0u) << "who follows nobody points at nothing";
 }
 
-TEST_F(CompanyTest, SharedTourBeginsAFewTimesASecondAtMost) {
+TEST_F(SharedTourTest, SharedTourBeginsAFewTimesASecondAtMost) {
   begin(false, false);
   v1::ClientMessage off, on, follows;
   off.mutable_present()->set_on(false);
@@ -233,7 +233,7 @@ TEST_F(CompanyTest, SharedTourBeginsAFewTimesASecondAtMost) {
   EXPECT_EQ(later.connection->lead->state(), v1::Lead::ENDED) << "nobody leads any more";
 }
 
-TEST_F(CompanyTest, NobodyIsToldWhereOthersAreUnlessTheLeaderWantsIt) {
+TEST_F(SharedTourTest, NobodyIsToldWhereOthersAreUnlessTheLeaderWantsIt) {
   begin(false, false);
   move(*leader);
   move(*follower);
@@ -242,7 +242,7 @@ TEST_F(CompanyTest, NobodyIsToldWhereOthersAreUnlessTheLeaderWantsIt) {
   EXPECT_TRUE(follower->connection->companies.empty());
 }
 
-TEST_F(CompanyTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
+TEST_F(SharedTourTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
   begin(false, true);
   const auto& told = follower->connection->companies;
   move(*leader);
@@ -259,7 +259,7 @@ TEST_F(CompanyTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
   EXPECT_EQ(leader->connection->companies.size(), told.size());
 }
 
-TEST_F(CompanyTest, WhoComesHearsAtOnceWhereTheOthersAre) {
+TEST_F(SharedTourTest, WhoComesHearsAtOnceWhereTheOthersAre) {
   begin(false, true);
   move(*leader);
   run_until([&] { return !follower->connection->companies.empty(); });
@@ -274,7 +274,7 @@ TEST_F(CompanyTest, WhoComesHearsAtOnceWhereTheOthersAre) {
   }
 }
 
-TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
+TEST_F(SharedTourTest, WhoEntersAnotherSceneLeavesIt) {
   begin(true, true);
   move(*leader);
   move(*follower);
@@ -301,7 +301,7 @@ TEST_F(CompanyTest, WhoEntersAnotherSceneLeavesIt) {
   EXPECT_EQ(told.back().places_size(), 1);
 }
 
-TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
+TEST_F(SharedTourTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
   begin(false, false);
   lead_to_the_attic();
   EXPECT_EQ(follower->connection->lead->state(), v1::Lead::ENDED);
@@ -323,7 +323,7 @@ TEST_F(CompanyTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
   EXPECT_EQ(again.connection->lead->state(), v1::Lead::LEADS);
 }
 
-TEST_F(CompanyTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
+TEST_F(SharedTourTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
   authorize = [](const std::string& token) {
     return Permit{[narrow = token == "narrow"](std::string_view scene_id, Use) -> Refusal {
       return narrow && scene_id == "attic" ? Refusal("not yours") : std::nullopt;
@@ -355,7 +355,7 @@ TEST_F(CompanyTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
   EXPECT_EQ(alone->error->code(), v1::Error::UNAUTHORIZED);
 }
 
-TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
+TEST_F(SessionsTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
   authorize = [](const auto&) {
     return Permit{[](std::string_view scene_id, Use) -> Refusal {
       return scene_id == "vault" ? Refusal("not yours") : std::nullopt;
@@ -372,7 +372,7 @@ TEST_F(PlacesTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
   EXPECT_THAT(scenes.prepared, testing::ElementsAre("hall", "attic"));
 }
 
-TEST_F(PlacesTest, StopsThatNoTourHasAreNotCounted) {
+TEST_F(SessionsTest, StopsThatNoTourHasAreNotCounted) {
   scenes.give_tours(R"({"tours":[{"stops":[{},{}]},{"stops":[]},{"stops":[{}]}]})");
   start();
   Visitor& visitor = join();

@@ -1,13 +1,13 @@
-#include "server/visit/admission_desk.h"
+#include "server/visit/admission_controller.h"
 
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
 
-using AdmissionDeskTest = PlacesTest;
+using AdmissionControllerTest = SessionsTest;
 
-TEST_F(AdmissionDeskTest, ABurstWaitsForWhatTheFirstOnesCost) {
+TEST_F(AdmissionControllerTest, ABurstWaitsForWhatTheFirstOnesCost) {
   options.min_fps = 10;
   options.cpus = 2;
   start();
@@ -31,7 +31,7 @@ void wish_for_4k(v1::Hello& hello) {
 }
 
 /// Two GPUs, and as many processors as it takes.
-struct MeasuredAdmission : PlacesTest {
+struct MeasuredAdmission : SessionsTest {
   void start(float frame_ms) {
     devices = std::make_shared<DeviceSet>(std::vector<int>{0, 1});
     for (const int device : {0, 1}) devices->add(device);
@@ -40,7 +40,7 @@ struct MeasuredAdmission : PlacesTest {
     scenes = OneScene(renderer);
     options.min_fps = 10;
     options.cpus = 1000;
-    PlacesTest::start();
+    SessionsTest::start();
   }
   /// Until it is known what frames cost.
   void measure() {
@@ -96,7 +96,7 @@ TEST_F(MeasuredAdmission, WhoHasWaitedForLongIsNotOvertakenAnyMore) {
   run_until([&] { return first->welcome && second->welcome; });
 }
 
-TEST_F(AdmissionDeskTest, NobodyWaitsWithoutEnd) {
+TEST_F(AdmissionControllerTest, NobodyWaitsWithoutEnd) {
   options.max_sessions = 1;
   options.policy.longest_wait = 100ms;
   start();
@@ -108,7 +108,7 @@ TEST_F(AdmissionDeskTest, NobodyWaitsWithoutEnd) {
   EXPECT_THAT(connection->error->message(), testing::HasSubstr("no place came free"));
 }
 
-TEST_F(AdmissionDeskTest, WhoWaitsForMeasurementsIsToldSo) {
+TEST_F(AdmissionControllerTest, WhoWaitsForMeasurementsIsToldSo) {
   options.min_fps = 10;
   options.cpus = 1;
   options.max_queue = 1;

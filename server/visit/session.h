@@ -15,29 +15,31 @@
 
 namespace catgs {
 
-class Place;
-using PlaceList = std::vector<std::shared_ptr<Place>>;
+class Session;
+using SessionList = std::vector<std::shared_ptr<Session>>;
 
-/// Serves a place. The owner of all places implements it.
+/// Serves a session. The owner of all sessions implements it.
 class Admissions {
  public:
   virtual ~Admissions() = default;
-  /// Hands the connection to the place of its resume or watch token, or begins the newcomer's
+  /// Hands the connection to the session of its resume or watch token, or begins the newcomer's
   /// visit.
   virtual void on_hello(const std::shared_ptr<ClientConnection>& from,
-                        std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) = 0;
-  virtual AdmissionAnswer admit(Place& place, const Hello& hello) = 0;
-  virtual SceneAnswer find_scene(const std::string& scene_id, TimePoint now) = 0;
-  /// `from`, the place's visitor, follows another session from now on, or none.
-  virtual void follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) = 0;
-  /// The place's visitor follows nobody any more, and gets a message.
-  virtual void stop_following(Place& place) = 0;
-  /// The place that leads this follower; null: none does.
-  virtual Place* leader_of(const ClientConnection& follower) = 0;
-  [[nodiscard]] virtual std::uint32_t admitted() const = 0;
-  /// The place's visit has ended.
-  virtual void leave(Place& place) = 0;
+                        std::shared_ptr<Session> newcomer, Hello hello, TimePoint now) = 0;
+  virtual AdmissionAnswer admit(Session& session, const Hello& hello) = 0;
+  /// `from`, the session's visitor, follows another session from now on, or none.
+  virtual void follow(Session& session, ClientConnection& from, const Follow& wish,
+                      TimePoint now) = 0;
+  /// The session's visitor follows nobody any more, and gets a message.
+  virtual void stop_following(Session& session) = 0;
+  /// The session whose tour this client follows; null: none.
+  virtual Session* host_of(const ClientConnection& follower) = 0;
+  /// The session's visit has ended.
+  virtual void leave(Session& session) = 0;
 };
+
+/// Asks for a scene that this server may not have.
+SceneAnswer find_scene(SceneSource& scenes, const std::string& scene_id, TimePoint now);
 
 /// The visitor, as of the last hello, and what it was granted.
 struct Visitor {
@@ -47,24 +49,30 @@ struct Visitor {
   EncoderChoice encoder;  // of the streams that are opened from here on
   std::optional<TimePoint> admitted_at;
 
-  /// Notes the token of a hello, and returns what it permits.
-  Permit come_by(const std::string& by, const Authorize& authorize) {
-    Permit permit = authorize(by);
+  void come_by(const std::string& by, const Authorize& authorize) {
     token = by;
-    link_id = permit.link_id;
-    return permit;
+    link_id = authorize(by).link_id;
   }
 };
 
-/// One visit's place in the server: its Visit, its Audience, its stream on the executor and its
-/// usage of the machine. Code that changes the Visit from outside must tell Frames. Session thread
+/// What a visit may ask of the server around it, beside its pictures.
+struct RequestLimits {
+  RateLimit shared_tours{2.0, 8.0, Clock::now()};
+  RateLimit pings{2.0, 2.0, Clock::now()};
+  RateLimit preparations{0.1, 3.0, Clock::now()};
+  /// Refusals that get an answer. A flood costs neither answers nor lines of the log.
+  RateLimit refusals{1.0, 1.0, Clock::now()};
+};
+
+/// A client's session: its Visit, its Audience, its stream on the executor and its usage of the
+/// machine. Code that changes the Visit from outside must tell Frames. Session thread
 /// only.
-class Place final : public VisitHost, public std::enable_shared_from_this<Place> {
+class Session final : public VisitHost, public std::enable_shared_from_this<Session> {
  public:
-  /// `around` and `admissions` outlive the place, except for its destructor.
-  Place(const VisitContext& around, Admissions& admissions, std::string session_id,
-        std::string address);
-  ~Place() override;  // any thread but the executor's
+  /// `around` and `admissions` outlive the session, except for its destructor.
+  Session(const VisitContext& around, Admissions& admissions, std::string session_id,
+          std::string address);
+  ~Session() override;  // any thread but the executor's
 
   // Called by its connections.
   void on_message(ClientConnection& from, const ClientMessage& message, const LinkState& link,
@@ -79,8 +87,6 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   // VisitHost
   AdmissionAnswer admit(const Hello& hello) override { return admissions_.admit(*this, hello); }
   SceneAnswer find_scene(const std::string& wish) override;
-  std::vector<std::string> scene_ids() override;
-  std::uint32_t session_count() override { return admissions_.admitted(); }
   void sign(Welcome& welcome) override;
   void send(const ServerMessage& message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;
@@ -88,7 +94,8 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   void open_stream(StreamSettings settings) override;
   std::optional<EncoderChoice> other_encoder(Fault why) override;
 
-  void on_tick(TimePoint now);
+  /// `sessions`: of the server.
+  void on_tick(TimePoint now, int sessions);
   /// Accounts for a frame's result and its cost.
   void account_for(const FrameResult& result, TimePoint now);
   /// True if the visitor's token allows spectators. A resume may bring another token.
@@ -106,7 +113,7 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
  private:
   const VisitContext& around_;
   Admissions& admissions_;
-  const std::string id_;  // of the session
+  const std::string id_;
   const std::shared_ptr<FrameExecutor> executor_;
   std::shared_ptr<Stream> stream_ = std::make_shared<Stream>();
   Visitor visitor_;
@@ -114,11 +121,10 @@ class Place final : public VisitHost, public std::enable_shared_from_this<Place>
   SessionUsage usage_;
   Audience audience_;
   VisitTally tally_;
-  RateLimit pings_, preparations_, shared_tours_;
-  RateLimit refusals_;  // that get an answer: a flood costs neither answers nor lines of the log
+  RequestLimits limits_;
 };
 
-/// Returns null if no place has this id.
-std::shared_ptr<Place> find_place(const PlaceList& places, std::string_view session_id);
+/// Returns null if no session has this id.
+std::shared_ptr<Session> find_session(const SessionList& sessions, std::string_view session_id);
 
 }  // namespace catgs

@@ -1,4 +1,4 @@
-#include "server/visit/places.h"
+#include "server/visit/sessions.h"
 
 #include <algorithm>
 #include <utility>
@@ -19,32 +19,32 @@ constexpr std::chrono::milliseconds tick_interval{250};
 
 }  // namespace
 
-Places::Places(VisitContext around) : around_(std::move(around)), tick_timer_(around_.io) {
+Sessions::Sessions(VisitContext around) : around_(std::move(around)), tick_timer_(around_.io) {
   tick();
 }
 
-std::shared_ptr<ConnectionListener> Places::accept(std::shared_ptr<Connection> connection) {
+std::shared_ptr<ConnectionListener> Sessions::accept(std::shared_ptr<Connection> connection) {
   const std::string address = connection->peer_address();
-  auto place = std::make_shared<Place>(around_, *this, random_id(), address);
+  auto session = std::make_shared<Session>(around_, *this, random_id(), address);
   auto client =
       std::make_shared<ClientConnection>(around_.io, around_.metrics, std::move(connection),
                                          [this, address] { forget_connection(address); });
-  boost::asio::post(around_.io, [this, client, place] { add(client, place); });
+  boost::asio::post(around_.io, [this, client, session] { add(client, session); });
   return client;
 }
 
-void Places::add(const std::shared_ptr<ClientConnection>& connection,
-                 const std::shared_ptr<Place>& place) {
+void Sessions::add(const std::shared_ptr<ClientConnection>& connection,
+                   const std::shared_ptr<Session>& session) {
   const VisitOptions& options = around_.options;
-  const std::string address = limited_as(place->audience().address());
+  const std::string address = limited_as(session->audience().address());
   const int same_address = ++connections_by_address_[address];
   ++connections_;
-  places_.push_back(place);
-  connection->belong_to(*place);
+  sessions_.push_back(session);
+  connection->belong_to(*session);
   const auto refuse = [&](std::string_view why) {
-    place->visit().fail(ErrorCode::server_full, why);
+    session->visit().fail(ErrorCode::server_full, why);
   };
-  if (desk_.is_shut())
+  if (admission_.is_shut())
     refuse("this server is shutting down");
   else if (connections_ > options.max_sessions * (1 + options.max_spectators) + options.max_queue +
                               options.max_greeting)
@@ -54,21 +54,21 @@ void Places::add(const std::shared_ptr<ClientConnection>& connection,
         fmt::format("{} connections from {} already: close one first", same_address - 1, address));
 }
 
-void Places::forget_connection(const std::string& address) {
+void Sessions::forget_connection(const std::string& address) {
   --connections_;
   const auto it = connections_by_address_.find(limited_as(address));
   if (--it->second == 0) connections_by_address_.erase(it);
 }
 
-void Places::on_hello(const std::shared_ptr<ClientConnection>& from,
-                      std::shared_ptr<Place> newcomer, Hello hello, TimePoint now) {
-  const auto host = hello.watch_token.empty() ? presenter_for_spectator(hello)
-                                              : presenter(hello.watch_token, hello.token);
+void Sessions::on_hello(const std::shared_ptr<ClientConnection>& from,
+                        std::shared_ptr<Session> newcomer, Hello hello, TimePoint now) {
+  const auto host = hello.watch_token.empty() ? host_for_spectator(hello)
+                                              : tour_host(hello.watch_token, hello.token);
   if (host) {
     if (const auto* error = std::get_if<ErrorMessage>(&*host))
       return newcomer->visit().fail(error->code, error->message);
-    if (!has_room_for_follower(hello, *std::get<Place*>(*host)))
-      return watch(from, *newcomer, *std::get<Place*>(*host), hello, now);
+    if (!has_room_for_follower(hello, *std::get<Session*>(*host)))
+      return watch(from, *newcomer, *std::get<Session*>(*host), hello, now);
   }
   const auto resumed =
       around_.tokens.read_resume_token(hello.resume_token, around_.options.wall_clock_s());
@@ -76,30 +76,30 @@ void Places::on_hello(const std::shared_ptr<ClientConnection>& from,
     // The name may by now mean a scene other than the one that was shown.
     if (hello.scene_id.empty() || hello.scene_id == name_in(resumed->scene_id))
       hello.scene_id = resumed->scene_id;
-    if (const auto known = find_place(places_, resumed->session_id)) {
+    if (const auto known = find_session(sessions_, resumed->session_id)) {
       if (resume(from, *newcomer, *known, hello, now)) return;
     } else {
       // The session comes from another server of the fleet, or its grace is over. It keeps its id.
       newcomer->audience().detach();
-      const auto place = std::ranges::find(places_, newcomer);
-      newcomer = std::make_shared<Place>(around_, *this, resumed->session_id,
-                                         newcomer->audience().address());
-      *place = newcomer;
+      const auto session = std::ranges::find(sessions_, newcomer);
+      newcomer = std::make_shared<Session>(around_, *this, resumed->session_id,
+                                           newcomer->audience().address());
+      *session = newcomer;
       from->belong_to(*newcomer);
     }
   }
   newcomer->visit().on_message(hello, now);
-  desk_.on_newcomer(now);
+  admission_.on_newcomer(now);
 }
 
-bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
-                    Place& known, const Hello& hello, TimePoint now) {
-  const auto choice = desk_.choose(hello);
+bool Sessions::resume(const std::shared_ptr<ClientConnection>& connection, Session& newcomer,
+                      Session& known, const Hello& hello, TimePoint now) {
+  const auto choice = admission_.choose(hello);
   const auto* scene_id = std::get_if<std::string>(&choice);
   if (!scene_id || !known.visit().life().resumable()) return false;
   // The session's own scene is in memory. A client that selects another scene begins a new session
   // and may have to wait.
-  auto found = desk_.find_scene(*scene_id, now);
+  auto found = find_scene(around_.scenes, *scene_id, now);
   auto* scene = std::get_if<std::shared_ptr<const SceneEntry>>(&found);
   if (!scene) return false;
   around_.metrics.sessions_resumed.Increment();
@@ -119,20 +119,20 @@ bool Places::resume(const std::shared_ptr<ClientConnection>& connection, Place& 
   const PicturePlan& plan = known.visit().stream().plan();
   known.visit().on_resumed(
       hello, {std::move(*scene), visitor.encoder, plan.effort(), plan.pixel_share()}, now);
-  if (!known.may_be_watched()) known.audience().end_presentation();
+  if (!known.may_be_watched()) known.audience().end_tour();
   around_.frames.changed(known);
   return true;
 }
 
-std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_token,
-                                                     const std::string& access_token) {
+std::variant<Session*, ErrorMessage> Sessions::tour_host(const std::string& watch_token,
+                                                         const std::string& access_token) {
   const auto refused = [](ErrorCode code, std::string_view why) {
     return ErrorMessage{code, std::string(why), true};
   };
   const auto id = around_.tokens.read_watch_token(watch_token);
   if (!id)
     return refused(ErrorCode::unauthorized, "this link to watch a session is not valid here");
-  const auto host = find_place(places_, *id);
+  const auto host = find_session(sessions_, *id);
   if (!host || !host->visit().life().resumable())
     return refused(ErrorCode::session_ended, "the session of this link has ended");
   if (host->visit().life().state() != VisitState::live)
@@ -140,9 +140,9 @@ std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_to
   if (!host->may_be_watched())
     return refused(ErrorCode::unauthorized,
                    "the session of this link is not to be watched any more");
-  if (!host->audience().presentation().since())
+  if (!host->audience().tour().since())
     return refused(ErrorCode::session_ended, "the session of this link does not present now");
-  // The leader's link opens the presentation, also to those without an access token. Only a link
+  // The host's link opens the tour, also to those without an access token. Only a link
   // of role solo is refused: its holder chose not to watch.
   const std::string& scene_id = host->visit().stream().scene()->facts.scene_id;
   const Permit permit = around_.authorize(access_token);
@@ -154,7 +154,7 @@ std::variant<Place*, ErrorMessage> Places::presenter(const std::string& watch_to
   return host.get();
 }
 
-std::optional<std::variant<Place*, ErrorMessage>> Places::presenter_for_spectator(
+std::optional<std::variant<Session*, ErrorMessage>> Sessions::host_for_spectator(
     const Hello& hello) {
   const Permit permit = around_.authorize(hello.token);
   const auto only_watches = [&](const std::string& scene_id) {
@@ -164,29 +164,29 @@ std::optional<std::variant<Place*, ErrorMessage>> Places::presenter_for_spectato
   const auto ids = around_.scenes.scene_ids();
   if (!hello.scene_id.empty() ? !only_watches(wanted) : std::ranges::none_of(ids, only_watches))
     return std::nullopt;
-  Place* first = nullptr;
-  for (const auto& place : places_) {
-    const auto since = place->audience().presentation().since();
-    if (!since || place->visit().life().state() != VisitState::live || !place->may_be_watched())
+  Session* first = nullptr;
+  for (const auto& session : sessions_) {
+    const auto since = session->audience().tour().since();
+    if (!since || session->visit().life().state() != VisitState::live || !session->may_be_watched())
       continue;
-    const std::string& scene_id = place->visit().stream().scene()->facts.scene_id;
+    const std::string& scene_id = session->visit().stream().scene()->facts.scene_id;
     if (!only_watches(scene_id) || (!hello.scene_id.empty() && scene_id != wanted)) continue;
-    if (!first || *since < *first->audience().presentation().since()) first = place.get();
+    if (!first || *since < *first->audience().tour().since()) first = session.get();
   }
   if (first) return first;
   return ErrorMessage{ErrorCode::no_leader, "nobody leads through this scene now", true};
 }
 
-bool Places::has_room_for_follower(Hello& hello, Place& host) {
+bool Sessions::has_room_for_follower(Hello& hello, Session& host) {
   const std::string& scene_id = host.visit().stream().scene()->facts.scene_id;
   if (!hello.follow || !around_.authorize(hello.token).allows(scene_id, Use::own_session))
     return false;
   hello.scene_id = scene_id;
-  return desk_.has_spare_place(hello);
+  return admission_.has_spare_slot(hello);
 }
 
-void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& newcomer,
-                   Place& host, const Hello& hello, TimePoint now) {
+void Sessions::watch(const std::shared_ptr<ClientConnection>& connection, Session& newcomer,
+                     Session& host, const Hello& hello, TimePoint now) {
   const auto refuse = [&](ErrorCode code, std::string_view why) {
     newcomer.visit().fail(code, why);
   };
@@ -197,12 +197,12 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
                   "the client cannot decode what the session of this link is encoded as");
   if (audience.full())
     return refuse(ErrorCode::server_full,
-                  fmt::format("{} people watch this session already", audience.company()));
+                  fmt::format("{} people watch this session already", audience.participants()));
   newcomer.audience().detach();
   leave(newcomer);
   const Permit permit = around_.authorize(hello.token);
   connection->watch(host);
-  Welcome welcome = visit.stream().welcome();
+  Welcome welcome = welcome_to(visit.stream(), host);
   welcome.may_leave = permit.allows(welcome.scene.scene_id, Use::own_session);
   audience.add(connection, std::move(welcome), permit.link_id);
   {
@@ -217,130 +217,130 @@ void Places::watch(const std::shared_ptr<ClientConnection>& connection, Place& n
   around_.frames.changed(host);
 }
 
-void Places::follow(Place& place, ClientConnection& from, const Follow& wish, TimePoint now) {
-  for (const auto& other : places_) other->audience().presentation().remove(from);
+void Sessions::follow(Session& session, ClientConnection& from, const Follow& wish, TimePoint now) {
+  for (const auto& other : sessions_) other->audience().tour().remove(from);
   if (wish.watch_token.empty()) return;
   const auto refuse = [&](ErrorCode code, std::string why) {
-    place.visit().say(ErrorMessage{code, std::move(why), false}, now);
-    place.visit().say(Lead{LeadState::ended, {}, 0, {}}, now);
+    session.visit().say(ErrorMessage{code, std::move(why), false}, now);
+    session.visit().say(Lead{LeadState::ended, {}, 0, {}}, now);
   };
-  const auto found = presenter(wish.watch_token, place.visitor().token);
+  const auto found = tour_host(wish.watch_token, session.visitor().token);
   if (const auto* error = std::get_if<ErrorMessage>(&found))
     return refuse(error->code, error->message);
-  Place& host = *std::get<Place*>(found);
-  if (&host == &place) return refuse(ErrorCode::bad_message, "a session cannot follow itself");
-  const auto scene_of = [](Place& any) { return any.visit().stream().scene()->facts.scene_id; };
-  if (scene_of(host) != scene_of(place))
-    return place.visit().say(Lead{.state = LeadState::ended,
-                                  .name = host.audience().presentation().name(),
-                                  .camera = {},
-                                  .elsewhere = true},
-                             now);
+  Session& host = *std::get<Session*>(found);
+  if (&host == &session) return refuse(ErrorCode::bad_message, "a session cannot follow itself");
+  const auto scene_of = [](Session& any) { return any.visit().stream().scene()->facts.scene_id; };
+  if (scene_of(host) != scene_of(session))
+    return session.visit().say(Lead{.state = LeadState::ended,
+                                    .name = host.audience().tour().name(),
+                                    .camera = {},
+                                    .elsewhere = true},
+                               now);
   if (host.audience().full())
-    return refuse(ErrorCode::server_full,
-                  fmt::format("{} people follow this session already", host.audience().company()));
-  host.audience().presentation().add(from.shared_from_this());
+    return refuse(ErrorCode::server_full, fmt::format("{} people follow this session already",
+                                                      host.audience().participants()));
+  host.audience().tour().add(from.shared_from_this());
 }
 
-void Places::stop_following(Place& place) {
-  const ClientConnection* const visitor = place.audience().visitor();
-  Place* const leader = visitor ? leader_of(*visitor) : nullptr;
-  if (!leader) return;
-  leader->audience().presentation().remove(*visitor);
-  place.send(Lead{LeadState::ended, {}, 0, {}});
+void Sessions::stop_following(Session& session) {
+  const ClientConnection* const visitor = session.audience().visitor();
+  Session* const host = visitor ? host_of(*visitor) : nullptr;
+  if (!host) return;
+  host->audience().tour().remove(*visitor);
+  session.send(Lead{LeadState::ended, {}, 0, {}});
 }
 
-Place* Places::leader_of(const ClientConnection& follower) {
-  const auto leader = std::ranges::find_if(
-      places_, [&](const auto& place) { return place->audience().presentation().has(follower); });
-  return leader == places_.end() ? nullptr : leader->get();
+Session* Sessions::host_of(const ClientConnection& follower) {
+  const auto found = std::ranges::find_if(
+      sessions_, [&](const auto& session) { return session->audience().tour().has(follower); });
+  return found == sessions_.end() ? nullptr : found->get();
 }
 
-void Places::tell_places(Place& host, TimePoint now) {
-  Presentation& presentation = host.audience().presentation();
-  if (!presentation.since()) return;
+void Sessions::tell_positions(Session& host, TimePoint now) {
+  SharedTour& tour = host.audience().tour();
+  if (!tour.since()) return;
   Company company;
-  const auto add = [&](Place& place) {
-    if (const auto& camera = place.audience().presentation().camera();
+  const auto add = [&](Session& session) {
+    if (const auto& camera = session.audience().tour().camera();
         camera && company.places.size() < most_told_places)
       company.places.push_back(camera->world_from_camera.position);
   };
-  if (presentation.tells_places()) {
+  if (tour.tells_positions()) {
     add(host);
-    for (const auto& place : places_)
-      if (const auto* visitor = place->audience().visitor(); visitor && presentation.has(*visitor))
-        add(*place);
+    for (const auto& session : sessions_)
+      if (const auto* visitor = session->audience().visitor(); visitor && tour.has(*visitor))
+        add(*session);
   }
-  host.audience().tell_places(company, now);
+  if (tour.tell(company, now)) host.audience().tell(company, now);
 }
 
-void Places::leave(Place& place) {
-  const auto it = std::ranges::find(places_, &place, [](const auto& p) { return p.get(); });
-  if (it == places_.end()) return;
+void Sessions::leave(Session& session) {
+  const auto it = std::ranges::find(sessions_, &session, [](const auto& p) { return p.get(); });
+  if (it == sessions_.end()) return;
   const TimePoint now = Clock::now();
-  if (place.visitor().admitted_at) {
-    const VisitStatistics& seen = place.visit().statistics();
-    const LogScope about(place.facts());
+  if (session.visitor().admitted_at) {
+    const VisitStatistics& seen = session.visit().statistics();
+    const LogScope about(session.facts());
     log_info({.event = "session_ended"}, "ended after {} frames, {} bytes, {} dropped",
              seen.frames_sent(), seen.bytes_sent(), seen.frames_dropped());
   }
-  desk_.leave(place, now);
-  around_.frames.withdraw(place);
-  place.audience().end_presentation();
-  places_.erase(it);
-  desk_.admit_waiting(now);
+  admission_.leave(session, now);
+  around_.frames.withdraw(session);
+  session.audience().end_tour();
+  sessions_.erase(it);
+  admission_.admit_waiting(now);
 }
 
-void Places::end_revoked(Place& place, const LinkIds& revoked) {
-  for (const auto& spectator : place.audience().spectators_by(revoked))
-    place.refuse(*spectator, ErrorCode::unauthorized, link_revoked);
-  if (!revoked.contains(place.visitor().link_id)) return;
-  place.visit().fail(ErrorCode::unauthorized, link_revoked);
-  around_.frames.changed(place);
+void Sessions::end_revoked(Session& session, const LinkIds& revoked) {
+  for (const auto& spectator : session.audience().spectators_by(revoked))
+    session.refuse(*spectator, ErrorCode::unauthorized, link_revoked);
+  if (!revoked.contains(session.visitor().link_id)) return;
+  session.visit().fail(ErrorCode::unauthorized, link_revoked);
+  around_.frames.changed(session);
 }
 
-void Places::tick() {
+void Sessions::tick() {
   if (stopped_) return;
   around_.options.on_tick();
   const TimePoint now = Clock::now();
   around_.scenes.on_tick(now);
   const RevokedLinks revoked = around_.revoked_links();
-  PlaceList gone;
-  for (const auto& place : places_) {
-    if (!revoked->empty()) end_revoked(*place, *revoked);
-    place->on_tick(now);
-    tell_places(*place, now);
-    if (!place->audience().connected() && place->visit().life().state() == VisitState::closed)
-      gone.push_back(place);
+  SessionList gone;
+  for (const auto& session : sessions_) {
+    if (!revoked->empty()) end_revoked(*session, *revoked);
+    session->on_tick(now, admission_.admitted());
+    tell_positions(*session, now);
+    if (!session->audience().visitor() && session->visit().life().state() == VisitState::closed)
+      gone.push_back(session);
   }
-  for (const auto& place : gone) leave(*place);
+  for (const auto& session : gone) leave(*session);
   anybody_looks_ = std::ranges::any_of(
-      places_, [](const auto& place) { return place->visit().life().on_show(); });
-  machine_.on_tick(places_, desk_.admitted(), now);
-  desk_.on_tick(now);
-  for (const auto& place : places_) around_.frames.changed(*place);
+      sessions_, [](const auto& session) { return session->visit().life().on_show(); });
+  machine_.on_tick(sessions_, admission_.admitted(), now);
+  admission_.on_tick(now);
+  for (const auto& session : sessions_) around_.frames.changed(*session);
   around_.metrics.connections.Set(connections_);
-  reports_.publish(places_, around_.encoders, around_.metrics);
+  reports_.publish(sessions_, around_.encoders, around_.metrics);
   tick_timer_.expires_after(tick_interval);
   tick_timer_.async_wait([this](const boost::system::error_code& error) {
     if (!error) tick();
   });
 }
 
-void Places::drain(std::chrono::milliseconds deadline) {
-  desk_.shut();
+void Sessions::drain(std::chrono::milliseconds deadline) {
+  admission_.shut();
   const Drain drain{static_cast<std::uint32_t>(deadline.count())};
-  for (const auto& place : places_) place->visit().say(drain, Clock::now());
+  for (const auto& session : sessions_) session->visit().say(drain, Clock::now());
 }
 
-void Places::close_all() {
-  for (const auto& place : places_) {
-    place->visit().end("the server is shutting down");
-    around_.frames.changed(*place);
+void Sessions::close_all() {
+  for (const auto& session : sessions_) {
+    session->visit().end("the server is shutting down");
+    around_.frames.changed(*session);
   }
 }
 
-void Places::stop_timer() {
+void Sessions::stop_timer() {
   stopped_ = true;  // cancel() does not take back a handler that is queued: that would re-arm
   tick_timer_.cancel();
 }

@@ -1,4 +1,4 @@
-#include "server/visit/admission_desk.h"
+#include "server/visit/admission_controller.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,22 +19,17 @@ double megapixels(glm::ivec2 size_px) { return 1e-6 * size_px.x * size_px.y; }
 
 }  // namespace
 
-AdmissionDesk::AdmissionDesk(const VisitContext& around, const PlaceList& places,
-                             const MachineUse& machine)
+AdmissionController::AdmissionController(const VisitContext& around, const SessionList& sessions,
+                                         const MachineUse& machine)
     : around_(around),
-      places_(places),
+      sessions_(sessions),
       machine_(machine),
       budget_({static_cast<double>(around.options.cpus),
                static_cast<double>(around.devices.views().size())},
               around.options.min_fps),
       queue_(around.options.max_queue) {}
 
-SceneAnswer AdmissionDesk::find_scene(const std::string& scene_id, TimePoint now) const {
-  if (around_.scenes.has(scene_id)) return around_.scenes.want(scene_id, now);
-  return ErrorMessage{ErrorCode::unknown_scene, no_such_scene(scene_id), false};
-}
-
-std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello) const {
+std::variant<std::string, ErrorMessage> AdmissionController::choose(const Hello& hello) const {
   const Permit permit = around_.authorize(hello.token);
   std::string wanted = around_.scenes.resolve(hello.scene_id);
   if (hello.scene_id.empty()) {
@@ -58,70 +53,70 @@ std::variant<std::string, ErrorMessage> AdmissionDesk::choose(const Hello& hello
   return wanted;
 }
 
-AdmissionBudget::Offer AdmissionDesk::offer_for(const Hello& hello,
-                                                std::span<const SessionDemand> present) const {
+AdmissionBudget::Offer AdmissionController::offer_for(
+    const Hello& hello, std::span<const SessionDemand> present) const {
   if (shut_ || admitted_ >= around_.options.max_sessions) return {Room::no};
   const FlowWish wish = wish_within(around_.options.policy, hello.settings, hello.viewport_px);
   return budget_.offer(present, {std::nullopt, megapixels(wish.size_px), wish.fps});
 }
 
-std::vector<Place*> AdmissionDesk::admitted_places() const {
-  std::vector<Place*> admitted;
-  for (const auto& place : places_)
-    if (place->visitor().admitted_at) admitted.push_back(place.get());
+std::vector<Session*> AdmissionController::admitted_sessions() const {
+  std::vector<Session*> admitted;
+  for (const auto& session : sessions_)
+    if (session->visitor().admitted_at) admitted.push_back(session.get());
   return admitted;
 }
 
-std::vector<SessionDemand> AdmissionDesk::demands() const {
+std::vector<SessionDemand> AdmissionController::demands() const {
   const TimePoint now = Clock::now();
   std::vector<SessionDemand> demands;
-  for (Place* const place : admitted_places()) {
-    const Visit& visit = place->visit();
+  for (Session* const session : admitted_sessions()) {
+    const Visit& visit = session->visit();
     const PicturePlan& plan = visit.stream().plan();
     const bool fresh =
-        now - *place->visitor().admitted_at < time_to_measure && !visit.life().rests(now);
-    demands.push_back({place->usage().frame_cost(), megapixels(plan.moving().size_px),
+        now - *session->visitor().admitted_at < time_to_measure && !visit.life().rests(now);
+    demands.push_back({session->usage().frame_cost(), megapixels(plan.moving().size_px),
                        plan.moving().fps, fresh, plan.pixel_share()});
   }
   return demands;
 }
 
-void AdmissionDesk::set_pixel_share(Place& place, double share) {
-  PicturePlan& plan = place.visit().stream().plan();
+void AdmissionController::set_pixel_share(Session& session, double share) {
+  PicturePlan& plan = session.visit().stream().plan();
   const double work = frame_work(megapixels(plan.moving().size_px));
   plan.use_pixel_share(share);
-  around_.frames.changed(place);
+  around_.frames.changed(session);
   const glm::ivec2 size_px = plan.moving().size_px;
-  place.usage().scale_frame_cost(frame_work(megapixels(size_px)) / work);
-  const LogScope about(place.facts());
+  session.usage().scale_frame_cost(frame_work(megapixels(size_px)) / work);
+  const LogScope about(session.facts());
   log_debug({.event = "picture_size"},
             "its pictures are {}x{} from now on: there is room for {:.0f} % of their pixels",
             size_px.x, size_px.y, 100.0 * share);
 }
 
-void AdmissionDesk::grow_pictures() {
+void AdmissionController::grow_pictures() {
   if (!queue_.empty()) return;
   if (const auto growth = budget_.growth(demands()))
-    set_pixel_share(*admitted_places()[growth->session], growth->pixel_share);
+    set_pixel_share(*admitted_sessions()[growth->session], growth->pixel_share);
 }
 
-bool AdmissionDesk::has_spare_place(const Hello& hello) const {
+bool AdmissionController::has_spare_slot(const Hello& hello) const {
   if (!queue_.empty()) return false;
   const auto offer = offer_for(hello, demands());
   return offer.room == Room::yes && offer.pixel_share >= 0.5 &&
          std::ranges::all_of(offer.kept, [](double kept) { return kept >= 1.0; });
 }
 
-AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
-  place.visitor().come_by(hello.token, around_.authorize);
-  const std::string& id = place.id();
+AdmissionAnswer AdmissionController::admit(Session& session, const Hello& hello) {
+  session.visitor().come_by(hello.token, around_.authorize);
+  const std::string& id = session.id();
   auto choice = choose(hello);
   if (auto* error = std::get_if<ErrorMessage>(&choice)) {
     queue_.leave(id);
     return std::move(*error);
   }
-  const std::string address = limited_as(place.audience().address());
-  const auto same_address = std::ranges::count_if(places_, [&](const auto& other) {
+  const std::string address = limited_as(session.audience().address());
+  const auto same_address = std::ranges::count_if(sessions_, [&](const auto& other) {
     return other->visitor().admitted_at && limited_as(other->audience().address()) == address;
   });
   if (same_address >= around_.options.max_sessions_per_address) {
@@ -135,14 +130,14 @@ AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
       its_turn ? offer_for(hello, demands()) : AdmissionBudget::Offer{.room = Room::no};
   if (its_turn) measuring_ = offer.room == Room::unknown;
   if (offer.room == Room::yes) {
-    // A client that waits for its scene holds no place: the scene may fail to load.
+    // A client that waits for its scene holds no slot: the scene may fail to load.
     queue_.leave(id);
-    auto scene = find_scene(std::get<std::string>(choice), Clock::now());
+    auto scene = find_scene(around_.scenes, std::get<std::string>(choice), Clock::now());
     if (const auto* awaited = std::get_if<SceneAwaited>(&scene)) return *awaited;
     if (auto* error = std::get_if<ErrorMessage>(&scene)) return std::move(*error);
-    return let_in(place, hello, std::get<0>(std::move(scene)), offer);
+    return let_in(session, hello, std::get<0>(std::move(scene)), offer);
   }
-  if (const auto position = queue_.join(id, Clock::now())) return place_in_queue(*position);
+  if (const auto position = queue_.join(id, Clock::now())) return queue_position(*position);
   return ErrorMessage{
       ErrorCode::server_full,
       measuring_
@@ -154,10 +149,10 @@ AdmissionAnswer AdmissionDesk::admit(Place& place, const Hello& hello) {
       true};
 }
 
-Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
-                                std::shared_ptr<const SceneEntry> scene,
-                                const AdmissionBudget::Offer& offer) {
-  const auto present = admitted_places();
+Admission AdmissionController::let_in(Session& session, const Hello& hello,
+                                      std::shared_ptr<const SceneEntry> scene,
+                                      const AdmissionBudget::Offer& offer) {
+  const auto present = admitted_sessions();
   ++admitted_;
   around_.metrics.sessions_admitted.Increment();
   for (std::size_t i = 0; i < offer.kept.size(); ++i)
@@ -166,10 +161,10 @@ Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
                       offer.kept[i] * present[i]->visit().stream().plan().pixel_share());
   const glm::ivec2 size_px =
       wish_within(around_.options.policy, hello.settings, hello.viewport_px).size_px;
-  Visitor& visitor = place.visitor();
+  Visitor& visitor = session.visitor();
   visitor.encoder = best_encoder(around_.encoders, hello.decoders).value();
   visitor.admitted_at = Clock::now();
-  LogFacts facts = place.facts();
+  LogFacts facts = session.facts();
   facts.event = "session_admitted";
   facts.scene = scene->facts.scene_id;
   log_info(facts, "{}{} looks at {}, {}x{}, {}", facts.address, by_link(facts), facts.scene,
@@ -179,22 +174,22 @@ Admission AdmissionDesk::let_in(Place& place, const Hello& hello,
           offer.pixel_share};
 }
 
-void AdmissionDesk::leave(Place& place, TimePoint now) {
-  if (const auto admitted_at = place.visitor().admitted_at) {
+void AdmissionController::leave(Session& session, TimePoint now) {
+  if (const auto admitted_at = session.visitor().admitted_at) {
     --admitted_;
     queue_.session_ended(now - *admitted_at);
   }
-  queue_.leave(place.id());
+  queue_.leave(session.id());
 }
 
-void AdmissionDesk::on_newcomer(TimePoint now) {
+void AdmissionController::on_newcomer(TimePoint now) {
   if (queue_.size() > 1) ask_waiting(now);
 }
 
-void AdmissionDesk::ask_waiting(TimePoint now) {
+void AdmissionController::ask_waiting(TimePoint now) {
   measuring_ = false;
   for (const auto& [id, since] : queue_.waiting()) {
-    Visit& visit = find_place(places_, id)->visit();
+    Visit& visit = find_session(sessions_, id)->visit();
     if (now - since >= around_.options.policy.longest_wait) {
       queue_.leave(id);
       visit.fail(ErrorCode::server_full,
@@ -214,19 +209,19 @@ void AdmissionDesk::ask_waiting(TimePoint now) {
   }
 }
 
-void AdmissionDesk::admit_waiting(TimePoint now) {
+void AdmissionController::admit_waiting(TimePoint now) {
   ask_waiting(now);
   queue_told_ = now;
   int position = 0;
   for (const auto& [id, since] : queue_.waiting())
-    find_place(places_, id)->visit().say(place_in_queue(++position), now);
+    find_session(sessions_, id)->visit().say(queue_position(++position), now);
 }
 
-QueuePlace AdmissionDesk::place_in_queue(int position) const {
+QueuePlace AdmissionController::queue_position(int position) const {
   return {position, measuring_ ? time_to_measure * position : queue_.estimate(position, admitted_)};
 }
 
-void AdmissionDesk::on_tick(TimePoint now) {
+void AdmissionController::on_tick(TimePoint now) {
   grow_pictures();
   if (measuring_ || !queue_told_ || now - *queue_told_ >= speak_at_least_every) admit_waiting(now);
   const auto demanded = demands();
