@@ -263,7 +263,8 @@ TEST_F(Media, AreCheckedBeforeTheyAreKept) {
   EXPECT_THAT(endless.receive(std::chrono::milliseconds(500)), HasSubstr(" 413 "));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "hall.media"),
                           std::filesystem::directory_iterator()),
-            2);
+            3)
+      << "door.jpg, film.mp4 and the lock of servers that save";
 }
 
 /// They are in memory until they are on the disk.
@@ -341,7 +342,8 @@ TEST_F(Media, EmptyAndDotSegmentsLeadWhereThePathWithoutThemDoes) {
   }
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "hall.media"),
                           std::filesystem::directory_iterator()),
-            2);
+            3)
+      << "door.jpg, film.mp4 and the lock of servers that save";
 }
 
 TEST_F(Media, OfToursAreFilesOrAtSitesThatTheOperatorNames) {
