@@ -18,6 +18,7 @@
 #include "render_core/base/error.h"
 #include "server/counts/visit_tally.h"
 #include "server/counts/visits_page.h"
+#include "tests/server/counts/a_day.h"
 #include "tests/support/temporary_folder.h"
 
 namespace catgs::test {
@@ -29,10 +30,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
-constexpr std::int64_t day_s = 86'400;
-constexpr const char* today = "2025-11-25";
 
 class VisitBookTest : public testing::Test {
  protected:

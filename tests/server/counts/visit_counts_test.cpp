@@ -8,15 +8,12 @@
 #include <gtest/gtest.h>
 
 #include "server/counts/visit_tally.h"
+#include "tests/server/counts/a_day.h"
 
 namespace catgs::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
-constexpr std::int64_t day_s = 86'400;
-constexpr const char* today = "2025-11-25";
 
 class VisitCountsTest : public testing::Test {
  protected:

@@ -1,7 +1,6 @@
 // HTTP by the byte, and crowds: what strangers may send to the port without a token. Real sockets
 // on loopback, a whole server in this process.
 
-#include <filesystem>
 #include <thread>
 
 #include <boost/system/system_error.hpp>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
@@ -29,43 +29,40 @@ constexpr std::string_view page_policy =
     "blob: data:; media-src 'self'; style-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
 
-/// Descriptors of this process, which is the server too.
-std::size_t open_descriptors() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
-    ++count;
-  return count;
-}
-
 class HttpConformance : public testing::Test {
  protected:
-  HttpConformance() {
+  static void SetUpTestSuite() {
     // Both ends of a thousand connections; libwebsockets takes what is allowed when it starts.
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
     limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
     ::setrlimit(RLIMIT_NOFILE, &limit);
-    folder.write("web/index.html", "<!doctype html>the page");
-    folder.write("web/large.bin", std::string(large_bytes, 'l'));
-    folder.write("secret.txt", "the secret");
-    server.emplace([&](ServerConfig& config) {
-      config.client_dir = (folder / "web").string();
+    folder.emplace();
+    folder->write("web/index.html", "<!doctype html>the page");
+    folder->write("web/large.bin", std::string(large_bytes, 'l'));
+    folder->write("secret.txt", "the secret");
+    server.emplace([](ServerConfig& config) {
+      config.client_dir = (*folder / "web").string();
       config.max_sessions = 64;
       config.max_sessions_per_address = 150;  // connections follow it (AcceptGate::bounds_for)
     });
   }
+  static void TearDownTestSuite() {
+    server.reset();
+    folder.reset();
+  }
 
-  std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\n"; }
+  static std::string host() { return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\n"; }
   /// Everything that the server answers to `request`, sent as it is.
-  std::string answer(const std::string& request) const {
+  static std::string answer(const std::string& request) {
     RawSocket socket(server->port());
     socket.send(request);
     return socket.receive(300ms);
   }
-  std::string answer_to_path(const std::string& path) const {
+  static std::string answer_to_path(const std::string& path) {
     return answer("GET " + path + " HTTP/1.1\r\n" + host() + "\r\n");
   }
-  void expect_alive() const {
+  static void expect_alive() {
     EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
     WireClient good(server->port());
     good.greet();
@@ -73,7 +70,7 @@ class HttpConformance : public testing::Test {
     EXPECT_FALSE(good.receive_frame().bitstream.empty());
   }
   /// The server notices closed sockets a little later.
-  static bool falls_to(std::size_t descriptors) {
+  static bool falls_to(std::ptrdiff_t descriptors) {
     for (int looks = 0; looks < 100; ++looks) {
       if (open_descriptors() <= descriptors) return true;
       std::this_thread::sleep_for(50ms);
@@ -82,9 +79,12 @@ class HttpConformance : public testing::Test {
   }
 
   static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
-  const TemporaryFolder folder;
-  std::optional<RunningServer> server;
+  static std::optional<TemporaryFolder> folder;
+  static std::optional<RunningServer> server;
 };
+
+std::optional<TemporaryFolder> HttpConformance::folder;
+std::optional<RunningServer> HttpConformance::server;
 
 TEST_F(HttpConformance, NoPathLeadsOutOfTheClient) {
   for (const char* path :
@@ -305,12 +305,12 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
 /// (server/net/net_server.cpp), `grace` 10 (server/net/body_deadline.h) and `piece_timeout_s` 30
 /// (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
-  write_self_signed(folder / "certificate.pem", folder / "key.pem");
+  write_self_signed(*folder / "certificate.pem", *folder / "key.pem");
   const RunningServer https([&](ServerConfig& config) {
-    config.tls_cert = (folder / "certificate.pem").string();
-    config.tls_key = (folder / "key.pem").string();
+    config.tls_cert = (*folder / "certificate.pem").string();
+    config.tls_key = (*folder / "key.pem").string();
   });
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   {
     std::vector<RawSocket> slow;
     for (int i = 0; i < 20; ++i) {
@@ -360,7 +360,7 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
 }
 
 TEST_F(HttpConformance, AThousandConnectionsLeaveRoomForOneMore) {
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   {
     std::vector<RawSocket> crowd;
     for (int i = 0; i < 1000; ++i) {
@@ -389,7 +389,7 @@ TEST_F(HttpConformance, AStormOfReconnectsLeavesNothingBehind) {
     WireClient first(server->port());
     resume_token = first.greet().resume_token();
   }
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&, t] {

@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* sidecar = R"({"tours": [{"title": "Mine", "stops": []}]})";
+constexpr const char* own_tours = R"({"tours": [{"title": "Mine", "stops": []}]})";
 
 /// Two folders, each of which may hold hall.ply: of 100 Gaussians in the north, 200 in the south.
 class SceneLinks : public FolderTest {
@@ -67,7 +67,7 @@ class SceneLinks : public FolderTest {
     }
   }
   HttpReply put(const std::string& scene, const std::string& token) const {
-    return http_put(server_->port(), "/api/scenes/" + scene + "/sidecar", sidecar,
+    return http_put(server_->port(), "/api/scenes/" + scene + "/sidecar", own_tours,
                     {{"authorization", "Bearer " + token}});
   }
   HttpReply tours(const std::string& scene, const std::string& token) const {

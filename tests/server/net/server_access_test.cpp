@@ -129,7 +129,7 @@ TEST(ServerAccess, AnswersNoForeignNameWhereNoTokenIsAskedFor) {
 
 TEST(ServerAccess, NoPathHidesAForeignName) {
   // libwebsockets decodes them before it looks for the end of the line.
-  RunningServer server([](ServerConfig&) {});
+  const RunningServer& server = shared_server();
   for (const int port : {server.port(), server.admin_port()})
     for (const char* path : {"/healthz%0a%0a", "/healthz%0aHost:[::1]", "/healthz%0aHost:localhost",
                              "/healthz%0d%0a%0d%0a", "/healthz%0d", "/healthz%0ahttp/1.1",

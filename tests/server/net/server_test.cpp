@@ -37,7 +37,7 @@ std::string sessions_json(const RunningServer& server) {
 }
 
 TEST(Server, StreamsTheNewestPose) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient client(server.port());
   const v1::Welcome welcome = client.greet(160, 96);
   EXPECT_EQ(welcome.version(), 1u);
@@ -68,7 +68,7 @@ TEST(Server, StreamsTheNewestPose) {
 }
 
 TEST(Server, SendsJpegToAClientThatDecodesNothingElse) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient client(server.port());
   const auto welcome = client.greet(64, 48, v1::CODEC_MJPEG);
   EXPECT_EQ(welcome.config().codec(), v1::CODEC_MJPEG);
@@ -96,7 +96,7 @@ TEST(TuneForFrames, TakesBbrWhereTheKernelOffersIt) {
 }
 
 TEST(Server, NewSettingsGiveANewConfigAndThenAnIdr) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient client(server.port());
   client.greet(160, 96);
   client.send_pose(1);
@@ -115,7 +115,7 @@ TEST(Server, NewSettingsGiveANewConfigAndThenAnIdr) {
 
 // As where a processor keeps up with no more in motion.
 TEST(Server, APictureAtRestHasItsOwnSize) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient client(server.port());
   client.greet(160, 96);
   v1::ClientMessage settings;
@@ -191,7 +191,7 @@ TEST(Server, CreditBoundsWhatIsInFlight) {
 }
 
 TEST(Server, SeveralSessionsShareOneScene) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   std::vector<std::unique_ptr<WireClient>> clients;
   for (int i = 0; i < 4; ++i) {
     clients.push_back(std::make_unique<WireClient>(server.port()));
@@ -208,7 +208,7 @@ TEST(Server, SeveralSessionsShareOneScene) {
 }
 
 TEST(Server, ABadMessageClosesItsSessionOnly) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient good(server.port());
   good.greet();
   WireClient bad(server.port());
@@ -228,7 +228,7 @@ TEST(Server, ABadMessageClosesItsSessionOnly) {
 }
 
 TEST(Server, RefusesWhatIsNoMessage) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   std::optional<v1::Error> error;
   WireClient garbage(server.port());
   garbage.send_bytes(std::string("\xff\xff\xff\xff", 4));
@@ -333,7 +333,7 @@ TEST(Server, ServesPagesAndNothingElse) {
 }
 
 TEST(Server, NamesABusyPort) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   ServerConfig config;
   config.scenes = {"synth:city:2000"};
   config.port = server.port();
@@ -359,7 +359,7 @@ TEST(Server, TellsClientsWhenItStops) {
 }
 
 TEST(Server, HasAPosterAndToursOfEachScene) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   const HttpReply poster = http_get(server.port(), "/api/scenes/city/poster.jpg");
   EXPECT_EQ(poster.status, 200);
   EXPECT_THAT(poster.body, testing::StartsWith("\xff\xd8\xff"));

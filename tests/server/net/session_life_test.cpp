@@ -2,13 +2,13 @@
 // goes. Real sockets on loopback, whole servers in this process.
 
 #include <algorithm>
-#include <filesystem>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 
@@ -91,7 +91,7 @@ TEST(SessionLifeOnSockets, AServerOfTheSameFleetGoesOn) {
   const auto in_fleet = [&](ServerConfig& config) { config.resume_key_file = key; };
   RunningServer a(in_fleet);
   RunningServer b(in_fleet);
-  RunningServer stranger;
+  const RunningServer& stranger = shared_server();
   WireClient first(a.port());
   const v1::Welcome welcome = first.greet();
   WireClient second(b.port());
@@ -280,10 +280,6 @@ TEST(SessionLifeOnSockets, FramesGoOnUntilTheClientHasMoved) {
   old_link.send(bye);
   EXPECT_EQ(old_link.receive_until_closed().close_code, 1000);
   old_server.join();  // nobody is left, so it does not wait for the deadline
-}
-
-std::ptrdiff_t open_descriptors() {
-  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
 }
 
 TEST(SessionLifeOnSockets, NothingLeaksOverManyLossesAndReturns) {

@@ -141,7 +141,7 @@ TEST(Spectators, SeeWhatTheHostSeesInOneEncoding) {
 }
 
 TEST(Spectators, HearOfNewSettingsAndMayLeave) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient host(server.port());
   const std::string link = host.greet(160, 96).watch_token();
   host.present();

@@ -1,42 +1,16 @@
 // Messages of companies, portals and clip planes.
 #include <limits>
-#include <span>
 #include <string>
-#include <variant>
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/catgs.pb.h"
-#include "server/net/wire.h"
+#include "tests/server/net/wire_messages.h"
 
 namespace catgs {
 namespace {
 
 using testing::HasSubstr;
-
-std::variant<ClientMessage, wire::ParseError> parse(const v1::ClientMessage& message) {
-  const std::string text = message.SerializeAsString();
-  return wire::parse_client_message(std::as_bytes(std::span(text)));
-}
-
-template <typename T>
-T parsed(const v1::ClientMessage& message) {
-  return std::get<T>(std::get<ClientMessage>(parse(message)));
-}
-
-std::string complaint(const v1::ClientMessage& message) {
-  const auto result = parse(message);
-  const auto* error = std::get_if<wire::ParseError>(&result);
-  return error ? error->what : "";
-}
-
-std::string hex(const std::vector<std::byte>& bytes) {
-  std::string text;
-  for (const std::byte b : bytes) text += fmt::format("{:02x}", std::to_integer<unsigned>(b));
-  return text;
-}
 
 TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
   v1::ClientMessage message;

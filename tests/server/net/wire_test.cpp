@@ -13,23 +13,13 @@
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
-#include "proto/catgs.pb.h"
+#include "tests/server/net/wire_messages.h"
 
 namespace catgs {
 namespace {
 
 using testing::HasSubstr;
 using namespace std::chrono_literals;
-
-std::string hex(const std::vector<std::byte>& bytes) {
-  std::string text;
-  for (const std::byte b : bytes) {
-    constexpr char digits[] = "0123456789abcdef";
-    text += digits[std::to_integer<unsigned>(b) >> 4];
-    text += digits[std::to_integer<unsigned>(b) & 15];
-  }
-  return text;
-}
 
 std::vector<std::byte> unhex(const std::string& text) {
   std::vector<std::byte> bytes;
@@ -50,22 +40,6 @@ T parsed(const std::vector<std::byte>& bytes) {
   const auto* message = std::get_if<ClientMessage>(&result);
   if (!message) throw std::runtime_error(std::get<wire::ParseError>(result).what);
   return std::get<T>(*message);
-}
-
-template <typename T>
-T parsed(const v1::ClientMessage& message) {
-  const std::string text = message.SerializeAsString();
-  const auto* data = reinterpret_cast<const std::byte*>(text.data());
-  return parsed<T>(std::vector(data, data + text.size()));
-}
-
-/// What parsing says against a message; empty: nothing.
-std::string complaint(const v1::ClientMessage& message) {
-  const std::string text = message.SerializeAsString();
-  const auto* data = reinterpret_cast<const std::byte*>(text.data());
-  const auto result = wire::parse_client_message({data, text.size()});
-  const auto* error = std::get_if<wire::ParseError>(&result);
-  return error ? error->what : "";
 }
 
 v1::ClientMessage good_hello() {
