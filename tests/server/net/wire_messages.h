@@ -19,6 +19,11 @@ inline std::variant<ClientMessage, wire::ParseError> parse(const v1::ClientMessa
 }
 
 template <typename T>
+T parsed(const std::vector<std::byte>& bytes) {
+  return std::get<T>(std::get<ClientMessage>(wire::parse_client_message(bytes)));
+}
+
+template <typename T>
 T parsed(const v1::ClientMessage& message) {
   return std::get<T>(std::get<ClientMessage>(parse(message)));
 }

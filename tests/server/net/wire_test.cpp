@@ -34,14 +34,6 @@ std::string golden(const std::string& name) {
   return nlohmann::json::parse(in).at(name).get<std::string>();
 }
 
-template <typename T>
-T parsed(const std::vector<std::byte>& bytes) {
-  const auto result = wire::parse_client_message(bytes);
-  const auto* message = std::get_if<ClientMessage>(&result);
-  if (!message) throw std::runtime_error(std::get<wire::ParseError>(result).what);
-  return std::get<T>(*message);
-}
-
 v1::ClientMessage good_hello() {
   v1::ClientMessage message;
   auto& hello = *message.mutable_hello();
