@@ -109,10 +109,10 @@ class RuleFindings(unittest.TestCase):
         for line in ("pages that were missing of late", "drawn for want of them", "It is told so.", "which goes on"):
             self.assertEqual(len(findings("", line)), 1, line)
             self.assertEqual(findings(line, path="deploy/a.md"), [], "not yet plain")
-        for name in ("OfNothingIsNothing", "WhoIsLateWaits", "ThatIsSo", "WhatIsRead"):
+        for name in ("OfNothingIsNothing", "WhoIsLateWaits", "ThatIsSo", "WhatIsRead", "WhereItEnds", "ForAll"):
             for declaration in (f"TEST(A, {name}) {{", f"TEST_F(A,\n       {name}) {{"):
-                found = findings("", *declaration.split("\n"), path="tests/load/a.cpp")
-                self.assertEqual(found, [f"tests/load/a.cpp:2: {name}: a test's name is a claim"])
+                found = findings("", *declaration.split("\n"), path="tests/server/a.cpp")
+                self.assertEqual(found, [f"tests/server/a.cpp:2: {name}: a test's name is a claim"])
         self.assertEqual(findings("TEST(A, OfferIsTaken) {", path="tests/load/a.cpp"), [])
 
     def test_links(self):

@@ -2,34 +2,19 @@
 
 #include "server/counts/visit_book.h"
 
-#include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <memory>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
-#include "render_core/base/error.h"
 #include "server/counts/visit_tally.h"
 #include "server/counts/visits_page.h"
 #include "tests/server/counts/a_day.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class VisitBookTest : public testing::Test {
  protected:
@@ -86,7 +71,7 @@ TEST_F(VisitBookTest, CountsStayFromOneStartToTheNext) {
   EXPECT_EQ(book.day("2025-11-26").at("garden").visits, 2u) << "in the file, and not yet there";
 }
 
-TEST_F(VisitBookTest, WithoutAFolderCountsStayInMemory) {
+TEST_F(VisitBookTest, CountsStayInMemoryWhenThereIsNoFolder) {
   const VisitBook book({}, counts_);
   counts_.visit("hall", DeviceKind::tablet);
   EXPECT_THAT(book.dates(), ElementsAre(today));

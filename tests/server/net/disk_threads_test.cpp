@@ -1,9 +1,6 @@
 #include "server/net/disk_threads.h"
 
-#include <atomic>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

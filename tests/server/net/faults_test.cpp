@@ -245,7 +245,7 @@ class SecondScene : public testing::Test {
   Metrics metrics_;
 };
 
-TEST_F(SecondScene, ThatNoGpuTakesIsNotLeftToTheProcessors) {
+TEST_F(SecondScene, IsNotLeftToTheProcessorsWhenNoGpuTakesIt) {
   devices_->add(0);  // as the CUDA core does that renders the first scene
   EXPECT_TRUE(std::holds_alternative<ErrorMessage>(wanted_later()));
   EXPECT_EQ(metrics_.scene_loads_failed.Value(), 1.0);

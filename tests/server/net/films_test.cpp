@@ -123,7 +123,7 @@ TEST_F(Films, DeleteCancelsTheJob) {
   EXPECT_THAT(send_delete(job + "/file"), StartsWith("HTTP/1.1 405 "));
 }
 
-TEST_F(Films, OfStrangersAreUnknownAndTakeNoPlace) {
+TEST_F(Films, StrangersFindNoJobAndTakeNoSlot) {
   for (const char* path : {"/api/films/guess", "/api/films/guess/file"})
     EXPECT_EQ(http_get(server->port(), path).status, 404) << path;
   std::vector<RawSocket> strangers;

@@ -125,7 +125,7 @@ TEST_F(Media, AnswerRangesOfBytes) {
               AllOf(HasSubstr(" 200 "), HasSubstr("content-length: " + size)));
 }
 
-TEST_F(Media, OfClientsThatGoOrStallCostOnlyTheirConnection) {
+TEST_F(Media, ClientsThatGoOrStallLoseOnlyTheirConnection) {
   start(false);
   std::string film = film_;
   film.resize(6 << 20, 'x');
@@ -267,7 +267,7 @@ TEST_F(Media, AreCheckedBeforeTheyAreKept) {
 }
 
 /// They are in memory until they are on the disk.
-TEST_F(Media, ThatAreLargeComeOneByOne) {
+TEST_F(Media, LargeUploadsAreTakenOneAtATime) {
   start(true);
   const auto begin = [&](const std::string& by) {
     RawSocket slow(server->port());
@@ -344,7 +344,7 @@ TEST_F(Media, EmptyAndDotSegmentsLeadWhereThePathWithoutThemDoes) {
             2);
 }
 
-TEST_F(Media, OfToursAreFilesOrAtSitesThatTheOperatorNames) {
+TEST_F(Media, ToursShowFilesAndSitesThatTheOperatorNames) {
   start(true);
   const auto save = [&](const std::string& src) {
     return http_put(

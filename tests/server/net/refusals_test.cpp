@@ -50,7 +50,7 @@ class Refusals : public testing::Test {
   std::ostringstream log_;
 };
 
-TEST_F(Refusals, OfHostsOriginsAndUploadsNameTheAddressBehindTheProxy) {
+TEST_F(Refusals, NameTheAddressBehindTheProxy) {
   const auto from = [](int host) {
     return std::pair<const std::string, std::string>("x-forwarded-for",
                                                      "198.51.100." + std::to_string(host));
@@ -76,7 +76,7 @@ TEST_F(Refusals, OfHostsOriginsAndUploadsNameTheAddressBehindTheProxy) {
   EXPECT_THAT(lines, Not(HasSubstr("sesame")));
 }
 
-TEST_F(Refusals, OfRequestsWithoutATokenOrInAFormThatIsNotTakenAreCounted) {
+TEST_F(Refusals, RequestsWithoutATokenOrInABadFormAreCounted) {
   const int port = server_->port();
   const std::string head = " HTTP/1.1\r\nHost: localhost\r\n";
   const std::string sidecar = "PUT /api/scenes/city/sidecar" + head;
@@ -105,7 +105,7 @@ TEST_F(Refusals, OfRequestsWithoutATokenOrInAFormThatIsNotTakenAreCounted) {
 }
 
 /// It answers none of these, and each costs it a line of its own.
-TEST_F(Refusals, OfWhatLibwebsocketsRefusesItselfAreCounted) {
+TEST_F(Refusals, RefusalsByLibwebsocketsAreCounted) {
   const std::string line_end = " HTTP/1.1\r\nHost: localhost\r\n";
   std::string arguments = "?a";
   for (int i = 0; i < 100; ++i) arguments += "&a";
@@ -139,7 +139,7 @@ TEST_F(Refusals, SayNotMoreThanALittleOfWhatTheStrangerSent) {
   EXPECT_THAT(lines, Not(AnyOf(HasSubstr(host.substr(0, 101)), HasSubstr(origin.substr(0, 101)))));
 }
 
-TEST_F(Refusals, OfMessagesNameTheAddress) {
+TEST_F(Refusals, BadMessagesNameTheAddress) {
   const auto closed_after = [&](const std::string& message, bool binary) {
     WireClient client(server_->port(), {.origin = "", .forwarded_for = "198.51.100.7"});
     client.send_bytes(message, binary);

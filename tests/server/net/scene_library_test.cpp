@@ -198,7 +198,7 @@ std::string url_part(const std::string& text) {
   return out;
 }
 
-TEST_F(SceneLibraryTest, WhatIsListedCanBeOpenedWhateverItsFileIsCalled) {
+TEST_F(SceneLibraryTest, EveryListedSceneOpensWhateverItsFileIsCalled) {
   const std::vector<std::string> names = {
       "colour\x1b[31m", "two\nlines",          "caf\xe9",
       "c1\xc2\x9b",     std::string(251, 'x'), "a?b#c%41%2f&+;=,:@!$(*)~^|`{}",

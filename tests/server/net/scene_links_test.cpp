@@ -146,7 +146,7 @@ TEST_F(SceneLinks, ALinkOfBeforeOpensNoneOfTwo) {
 }
 
 /// The page of an author who may see everything stays open while the server starts anew.
-TEST_F(SceneLinks, WhoComesBackIsNotBroughtToAnotherSceneOfTheName) {
+TEST_F(SceneLinks, AReturningVisitorGetsNoOtherSceneOfTheName) {
   std::filesystem::rename(folder_ / "south/hall.ply", folder_ / "later");
   start();
   const std::string author = link("", "author");

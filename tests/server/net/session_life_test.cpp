@@ -69,7 +69,7 @@ TEST(SessionLifeOnSockets, ASecondSocketTakesTheSessionOver) {
   EXPECT_TRUE(eventually([&] { return sessions(server).size() == 1; }));
 }
 
-TEST(SessionLifeOnSockets, WhoSaysGoodbyeIsNotWaitedFor) {
+TEST(SessionLifeOnSockets, AClientThatSaysGoodbyeIsNotWaitedFor) {
   RunningServer server;
   WireClient polite(server.port());
   polite.greet();
@@ -153,7 +153,7 @@ TEST(SessionLifeOnSockets, WaitsInLineForAPlace) {
   waiting[1]->receive_message(v1::ServerMessage::kWelcome);
 }
 
-TEST(SessionLifeOnSockets, WhoGivesUpWaitingMakesRoom) {
+TEST(SessionLifeOnSockets, AClientThatGivesUpWaitingMakesRoom) {
   RunningServer server([](ServerConfig& config) {
     config.max_sessions = 1;
     config.max_queue = 1;

@@ -69,7 +69,7 @@ class SidecarUpload : public testing::Test {
   std::optional<RunningServer> server;
 };
 
-TEST_F(SidecarUpload, OfAnAuthorIsInForceForWhoComesNext) {
+TEST_F(SidecarUpload, IsInForceForTheNextVisitor) {
   WireClient before(server->port());
   const auto old_start =
       before.greet(64, 64, v1::CODEC_H264, token("viewer")).scene().start_pose().position();
@@ -124,7 +124,7 @@ TEST_F(SidecarUpload, IsCheckedBeforeAnythingIsWritten) {
 }
 
 /// The whole of it is sent before the answer is read, as browsers do.
-TEST_F(SidecarUpload, ThatIsTooLongIsAnsweredAndNotCutOff) {
+TEST_F(SidecarUpload, IsAnsweredAndNotCutOffWhenTooLong) {
   EXPECT_EQ(put(token("author"), {}, std::string(1 << 20, ' ')).status, 400) << "it is read";
   EXPECT_EQ(put(token("author"), {}, std::string((1 << 20) + 1, ' ')).status, 413);
   const HttpReply refused = put(token("author"), {}, std::string(4 * max_upload_bytes, ' '));
@@ -170,7 +170,7 @@ TEST_F(SidecarUpload, IsNotTheBodyOfAGet) {
 }
 
 /// Two authors opened the scene before either of them saved.
-TEST_F(SidecarUpload, OfALaterAuthorDoesNotReplaceWhatTheyHaveNotSeen) {
+TEST_F(SidecarUpload, ReplacesNothingThatItsAuthorHasNotSeen) {
   const std::string author = token("author");
   ASSERT_TRUE(tours_as(author)["document"]["etag"].is_null());
   const HttpReply first = put(author, {{"if-none-match", "*"}});
@@ -194,7 +194,7 @@ TEST_F(SidecarUpload, OfALaterAuthorDoesNotReplaceWhatTheyHaveNotSeen) {
 }
 
 /// By another server of the same folder, or by hand.
-TEST_F(SidecarUpload, ThatIsRefusedShowsWhatWasWrittenMeanwhile) {
+TEST_F(SidecarUpload, ShowsWhatOthersWroteMeanwhile) {
   const std::string author = token("author");
   const std::string tag = put(author).headers.at("etag");
   folder.write("hall.json", R"({"tours": [{"title": "Theirs", "stops": []}],
@@ -260,7 +260,7 @@ TEST_F(SidecarUpload, BeyondItsPlacesIsToldToComeAgain) {
 }
 
 /// What it sent has come with the end of its connection.
-TEST_F(SidecarUpload, OfWhoHasGoneIsNotSaved) {
+TEST_F(SidecarUpload, IsNotSavedWhenItsAuthorHasGone) {
   RawSocket gone(server->port());
   gone.send_and_close(head(token("author"), sidecar.size()) + std::string(sidecar));
   const std::string other(R"({"tours": [{"title": "Other", "stops": []}]})");

@@ -224,7 +224,7 @@ TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
   EXPECT_EQ(refusal(server, watching)->code(), v1::Error::UNAUTHORIZED);
 }
 
-TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
+TEST(Spectators, FindTheLeaderOfTheirScene) {
   const ServerOfLinks server;
   WireClient host(server.port());
   const std::string id = host.greet(64, 64, v1::CODEC_H264, server.link("viewer")).session_id();

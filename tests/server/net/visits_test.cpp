@@ -86,7 +86,7 @@ TEST_F(Visits, HaveNoChunksForClientsOfHttp10) {
   EXPECT_THAT(head, AllOf(HasSubstr(" 200 "), EndsWith("\r\n\r\n"), Not(HasSubstr("date,scene"))));
 }
 
-TEST_F(Visits, OfAClientThatGoesCostOnlyItsConnection) {
+TEST_F(Visits, AClientThatGoesLosesOnlyItsConnection) {
   start();
   for (int i = 0; i < 20; ++i) {
     RawSocket gone(server_->admin_port());

@@ -197,7 +197,7 @@ TEST_F(WebsocketConformance, FloodsOfEmptyFramesEndTheConnection) {
   }
 }
 
-TEST_F(WebsocketConformance, WhoGoesOnAfterAnAnswerToItsFloodIsCutOff) {
+TEST_F(WebsocketConformance, AFloodThatContinuesAfterTheCloseFrameIsCutOff) {
   RawSocket socket = open();
   std::string flood;
   while (flood.size() < (1u << 20)) flood += client_frame(ws_fin | ws_pong, "");

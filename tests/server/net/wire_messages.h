@@ -28,11 +28,11 @@ T parsed(const v1::ClientMessage& message) {
   return std::get<T>(std::get<ClientMessage>(parse(message)));
 }
 
-/// What parsing says against a message; empty: nothing.
-inline std::string complaint(const v1::ClientMessage& message) {
+/// The field for which a message is refused; empty if it is taken.
+inline std::string wrong_field(const v1::ClientMessage& message) {
   const auto result = parse(message);
   const auto* error = std::get_if<wire::ParseError>(&result);
-  return error ? error->what : "";
+  return error ? error->what.substr(0, error->what.find_first_of(": ")) : "";
 }
 
 inline std::string hex(const std::vector<std::byte>& bytes) {

@@ -1,20 +1,19 @@
 // Trees are built and taken into use without keeping visitors or jobs waiting.
 #include "tests/server/scenes/scene_trees_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
   save_scene(random_cloud(100'000, 0), folder_ / "scenes/large.ply");  // 5.6 MB
   save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");       // 7.1 MB
   config_.scene_memory_mb = 6;
   start();
-  load("large");
+  visit("large");
   library_->on_tick(now_);
   EXPECT_THAT(state("large"), HasSubstr("building tree"));
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
+  EXPECT_TRUE(awaited("b"));
   run_until([&] { return state("b").starts_with("building"); });
   EXPECT_THAT(state("large"), HasSubstr("waits")) << "it is shown as a whole meanwhile";
   run_until([&] { return built() == 2; });
@@ -27,17 +26,16 @@ TEST_F(SceneTreesTest, SceneInTwoFormsKeepsNobodyOut) {
   config_.scene_memory_mb = 13;
   config_.gaussians_of_a_tree = 20'000;
   start();
-  Entry seen = load("b");
+  Entry seen = visit("b");
   run_until([&] { return library_->newer_form(*seen) != nullptr; });
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("c"), now_)))
-      << "the form before goes as soon as its visitor has the new one";
+  EXPECT_TRUE(awaited("c")) << "the form before goes as soon as its visitor has the new one";
   seen.reset();
-  EXPECT_FALSE(load("c")->in_pages);
+  EXPECT_FALSE(visit("c")->in_pages);
 }
 
 TEST_F(SceneTreesTest, BackgroundJobGoesOnWithTheTree) {
   start();
-  load("a");
+  visit("a");
   LeasedScene film = library_->lease(id("a"));
   ASSERT_TRUE(film.lease);
   EXPECT_FALSE(film.entry->in_pages);

@@ -1,21 +1,15 @@
 #include "server/scenes/tree_cache.h"
 
-#include <chrono>
-
-#include <nlohmann/json.hpp>
-
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 
 class TreeCacheTest : public FolderTest {
  protected:

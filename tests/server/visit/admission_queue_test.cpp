@@ -1,11 +1,9 @@
 #include "server/visit/admission_queue.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr TimePoint start{};
 
