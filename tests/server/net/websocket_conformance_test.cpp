@@ -1,19 +1,12 @@
 // RFC 6455 by the byte: what a client may do that ours does not, and what no client may do. Real
 // sockets on loopback, a whole server in this process.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-using testing::AnyOf;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 std::string hello() { return hello_message(64, 64, v1::CODEC_H264).SerializeAsString(); }
 
