@@ -8,7 +8,9 @@ usage() {
   cat <<'USAGE'
 usage: deploy/test.sh [--quick | --full] [--log FILE]
 
-Installs what the build and the tests need, builds, and runs the tests.
+Installs what the build and the tests need, builds, and runs the tests. A test that fails is tried once
+more. If that happens twice within a week, it counts as a failure: ~/.cache/catgs/unsteady-tests.json
+has the names.
 
   --quick      unit, integration and lint tests only (minutes, once built)
   (default)    also the load and browser tests

@@ -51,7 +51,7 @@ def output_of(case: str, output: str) -> list[str]:
 def suite_cases(path: pathlib.Path, output: str) -> list[Case]:
     """The cases of a GoogleTest result; none where the program ended before it wrote one."""
     try:
-        found = ElementTree.parse(path).getroot().iter("testcase")
+        found = ElementTree.fromstring(path.read_text("utf-8", "replace")).iter("testcase")
     except (OSError, ElementTree.ParseError):
         return []
     cases = []

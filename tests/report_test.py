@@ -131,6 +131,11 @@ class Suites(Run):
         result = self.report(self.suite([], SUITE_XML, 1))
         self.assertIn("FAILED A.Fails\n    a.cpp:1\n    why\n", result.stdout)
 
+    def test_bytes_that_are_no_text_hide_no_case(self):
+        tests = self.suite([], SUITE_XML, 1)
+        (self.folder / "result").write_bytes(SUITE_XML.replace("why]]", "caf\xe9]]").encode("latin-1"))
+        self.assertIn("1 tests passed, 1 failed, 2 skipped of 4", self.report(tests).stdout)
+
     def test_a_program_that_ends_inside_a_case_fails_there(self):
         result = self.report(self.suite([*FAILED_CASE, "[ RUN      ] A.Ends", "last words"], status=-1))
         self.assertEqual(result.returncode, 1)

@@ -66,6 +66,8 @@ class Explorer {
 
 std::optional<Surroundings> Explorer::explore(const glm::vec3& place) const {
   if (grid_.depth_around(place) > free_optical_depth) return std::nullopt;
+  const float below = grid_.distance_along(place, -up_);
+  if (below == VoxelGrid::never) return std::nullopt;
   Surroundings around{place};
   std::size_t stopped = 0;
   for (std::size_t d = 0; d < directions; ++d) {
@@ -73,8 +75,7 @@ std::optional<Surroundings> Explorer::explore(const glm::vec3& place) const {
     stopped += distance < VoxelGrid::never;
     around.distance[d] = std::min(distance, reach_);
   }
-  const float below = grid_.distance_along(place, -up_), above = grid_.distance_along(place, up_);
-  if (below == VoxelGrid::never) return std::nullopt;
+  const float above = grid_.distance_along(place, up_);
   around.height = below;
   around.enclosure = static_cast<float>(stopped) / directions;
   const float height = above == VoxelGrid::never ? 0.5f : below / (below + above);

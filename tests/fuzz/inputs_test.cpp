@@ -1,23 +1,15 @@
 // Findings of fuzzing stay fixed, inputs of the corpus reach their code, and mutants of all that
 // break nothing. This runs without libFuzzer, with every compiler and sanitizer.
-#include <chrono>
-#include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <limits>
-#include <random>
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "tests/fuzz/corpus.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/target.h"
+#include "tests/support/test.h"
 
 namespace catgs::fuzz {
 namespace {

@@ -71,9 +71,8 @@ class WebsocketChannel final : public Channel {
   asio::awaitable<void> shake_hands(const Url& url) {
     auto& tls = socket_.next_layer();
     SSL_set_tlsext_host_name(tls.native_handle(), url.host.c_str());
-    if (SSL_get_verify_mode(tls.native_handle()) != SSL_VERIFY_NONE) {
+    if (SSL_get_verify_mode(tls.native_handle()) != SSL_VERIFY_NONE)
       tls.set_verify_callback(asio::ssl::host_name_verification(url.host));
-    }
     co_await tls.async_handshake(asio::ssl::stream_base::client, use_awaitable);
   }
 

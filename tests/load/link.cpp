@@ -118,9 +118,8 @@ std::int64_t LinkShaper::carried_at(std::int64_t begin_us, std::size_t bytes) co
     const bool last = next == rate_.end();
     const double capacity =
         last ? bits : bits_per_us * static_cast<double>(next->from_us - time_us);
-    if (capacity >= bits && bits_per_us > 0.0) {
+    if (capacity >= bits && bits_per_us > 0.0)
       return time_us + static_cast<std::int64_t>(std::ceil(bits / bits_per_us));
-    }
     if (last) return never_us;  // an outage without an end
     bits -= capacity;
   }

@@ -278,9 +278,8 @@ asio::awaitable<void> LinkProxy::run() {
 void LinkProxy::close() {
   boost::system::error_code ignored;
   state_->acceptor.close(ignored);
-  for (auto& connection : state_->connections) {
+  for (auto& connection : state_->connections)
     connection.cancel.emit(asio::cancellation_type::terminal);
-  }
 }
 
 }  // namespace catgs::load

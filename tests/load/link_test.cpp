@@ -1,19 +1,13 @@
 #include "tests/load/link.h"
 
-#include <cmath>
-
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "render_core/base/error.h"
 #include "tests/load/units.h"
+#include "tests/support/test.h"
 
 namespace catgs::load {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::size_t segment = LinkShaper::segment_bytes;
 
@@ -141,9 +135,8 @@ TEST(LinkShaper, LosesTheShareThatItShould) {
 TEST(LinkShaper, DataBehindALossWaitsForIt) {
   LinkShaper link = shaper("delay=10ms,loss=50%,burst=1000");
   std::int64_t longest = 0;
-  for (std::int64_t now = 0; now < 3'000'000; now += 1000) {
+  for (std::int64_t now = 0; now < 3'000'000; now += 1000)
     longest = std::max(longest, link.send(segment, now) - now);
-  }
   EXPECT_EQ(longest, 10'000 + 20'000 + 200'000) << "delay, round trip, retransmission timeout";
 }
 

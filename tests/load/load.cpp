@@ -37,9 +37,8 @@ class TrajectoryMaker {
       throw InputError("--trace, --script", "", "one of them is needed",
                        "--script head plays recorded-like head motion");
     }
-    for (const std::string& path : options.traces) {
+    for (const std::string& path : options.traces)
       traces_.push_back(std::make_shared<const Trajectory>(read_camera_path(path).poses));
-    }
     // A wrong script fails now, not in each session.
     if (traces_.empty()) (void)make(0, SceneHints());
   }
@@ -71,24 +70,21 @@ void check(const GroupOptions& group, double duration_s) {
         end_s <= duration_s)) {
     throw InputError("--duration, --ramp", "", "the run must last longer than its ramp");
   }
-  if (!(group.wishes.fov_y_deg > 6.0f && group.wishes.fov_y_deg < 160.0f)) {
+  if (!(group.wishes.fov_y_deg > 6.0f && group.wishes.fov_y_deg < 160.0f))
     throw InputError("--fov-deg", "", "must lie between 6 and 160 degrees");
-  }
   for (const std::string& size : group.sizes) (void)parse_size("--size", size);
 }
 
 void check(const LoadOptions& options) {
   // The clock counts nanoseconds in 64 bits: an end that overflows it would lie in the past.
   constexpr double longest_run_s = 7 * 24 * 3600.0;
-  if (!(options.duration_s > 0.0 && options.duration_s <= longest_run_s)) {
+  if (!(options.duration_s > 0.0 && options.duration_s <= longest_run_s))
     throw InputError("--duration", "", "the run must last longer than nothing, a week at most");
-  }
   std::set<std::string> names;
   for (const GroupOptions& group : options.groups) {
     check(group, options.duration_s);
-    if (!names.insert(group.name).second) {
+    if (!names.insert(group.name).second)
       throw InputError("clients", group.name, "there are two groups of this name");
-    }
   }
 }
 
@@ -109,9 +105,8 @@ class Run {
   RunReport run() {
     begin_us_ = now_us();
     for (std::size_t i = 0; i < options_.groups.size(); ++i) start_group(i);
-    for (const TimedAction& action : options_.actions) {
+    for (const TimedAction& action : options_.actions)
       asio::co_spawn(io_, act(action), asio::detached);
-    }
     io_.run();
     decoders_.join();
     if (failure_) std::rethrow_exception(failure_);

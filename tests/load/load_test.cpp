@@ -2,11 +2,6 @@
 // milliseconds: those belong to benchmarks.
 #include "tests/load/load.h"
 
-#include <limits>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
@@ -15,6 +10,7 @@
 #include "tests/load/report.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/tls.h"
 
 namespace catgs::load {
@@ -125,8 +121,7 @@ TEST(Load, MjpegDecodesToo) {
   const RunningServer server([](ServerConfig& config) { config.encoder = EncoderKind::jpeg; });
   const RunReport run = run_load(small_load(url_of(server)));
   expect_clean(run);
-  for (const auto& report : run.groups[0].sessions)
-    EXPECT_THAT(report->encoder, ::testing::HasSubstr("jpeg"));
+  for (const auto& report : run.groups[0].sessions) EXPECT_THAT(report->encoder, HasSubstr("jpeg"));
 }
 
 TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
@@ -137,7 +132,7 @@ TEST(Load, TlsNeedsATrustedCertificateOrInsecure) {
   options.insecure = false;
   const RunReport refused = run_load(options);
   EXPECT_FALSE(refused.groups[0].sessions[0]->stats.connected);
-  EXPECT_THAT(errors_of(refused), ::testing::HasSubstr("certificate verify failed"));
+  EXPECT_THAT(errors_of(refused), HasSubstr("certificate verify failed"));
 }
 
 TEST(Load, ASilentClientGetsNoMoreFramesThanItsCredit) {

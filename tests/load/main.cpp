@@ -95,9 +95,7 @@ Scenario scenario_of(const ProgramOptions& options) {
   } else {
     scenario = read_scenario(options.file);
     for (const std::string& name : options.without) leave_out(name, scenario);
-    if (!options.scenario.check_scene.empty()) {
-      scenario.check_scene = options.scenario.check_scene;
-    }
+    if (!options.scenario.check_scene.empty()) scenario.check_scene = options.scenario.check_scene;
   }
   if (options.duration_s >= 0.0) scenario.load.duration_s = options.duration_s;
   scenario.load.url = options.url;

@@ -175,9 +175,8 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   add("sessions_connected", count_if([](const auto& s) { return s.stats.connected; }));
   add("sessions_held", held);
   add("held", held == static_cast<double>(sessions.size()) ? 1.0 : 0.0);
-  for (const NamedHistogram& histogram : histograms) {
+  for (const NamedHistogram& histogram : histograms)
     add_durations(histogram.name, merged(sessions, histogram.member), metrics);
-  }
   const Range fps = range_of(sessions, [](const SessionStats& stats) { return stats.fps(); });
   add("fps_min", fps.min);
   add("fps_mean", fps.mean);
@@ -193,9 +192,8 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   add_rests(sessions, metrics);
   for (const NamedCount& count : counts) {
     double sum = 0.0;
-    for (const auto& session : sessions) {
+    for (const auto& session : sessions)
       sum += static_cast<double>(session->stats.counts.*count.member);
-    }
     add(count.name, sum);
   }
   return metrics;
@@ -241,9 +239,8 @@ Metrics collect_metrics(const RunReport& report, const HoldBounds& bounds) {
   Metrics all;
   for (const GroupReport& group : report.groups) {
     const std::string prefix = group.name == unnamed_group ? "" : group.name + ".";
-    for (auto& [name, value] : collect_metrics(group.sessions, group.nominal_fps, bounds)) {
+    for (auto& [name, value] : collect_metrics(group.sessions, group.nominal_fps, bounds))
       all.emplace_back(prefix + name, value);
-    }
   }
   return all;
 }

@@ -1,8 +1,3 @@
-#include <cmath>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "render_core/base/error.h"
 #include "tests/load/histogram.h"
 #include "tests/load/pose_replay.h"
@@ -10,12 +5,10 @@
 #include "tests/load/session_stats.h"
 #include "tests/load/url.h"
 #include "tests/load/wire_client.h"
+#include "tests/support/test.h"
 
 namespace catgs::load {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 TEST(Url, TakesEveryForm) {
   const Url plain = parse_url("ws://127.0.0.1:8080");

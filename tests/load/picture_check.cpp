@@ -60,9 +60,8 @@ std::vector<float> rgb_of(const DecodedPicture& picture) {
       const double red = luma + 2.0 * (1.0 - m.red_weight) * cr;
       const double blue = luma + 2.0 * (1.0 - m.blue_weight) * cb;
       const double green = (luma - m.red_weight * red - m.blue_weight * blue) / green_weight;
-      for (const double value : {red, green, blue}) {
+      for (const double value : {red, green, blue})
         rgb.push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
-      }
     }
   }
   return rgb;

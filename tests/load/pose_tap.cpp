@@ -62,9 +62,8 @@ bool PoseTap::take_frame() {
   if (bytes.size() < payload_at + length) return false;
   constexpr int continuation = 0, binary = 2;
   if (opcode == continuation || opcode == binary) {
-    for (std::size_t i = 0; i < length; ++i) {
+    for (std::size_t i = 0; i < length; ++i)
       message_.push_back(bytes[payload_at + i] ^ bytes[mask_at + i % 4]);
-    }
     if (final) {
       v1::ClientMessage message;
       if (message.ParseFromArray(message_.data(), static_cast<int>(message_.size())) &&

@@ -1,11 +1,8 @@
 #include "tests/load/pose_tap.h"
 
-#include <algorithm>
-
-#include <gtest/gtest.h>
-
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
+#include "tests/support/test.h"
 
 namespace catgs::load {
 namespace {

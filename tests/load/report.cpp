@@ -52,9 +52,8 @@ void append_table(const GroupReport& group, const HoldBounds& bounds, std::strin
   const SessionReports& sessions = group.sessions;
   const Metrics metrics = collect_metrics(sessions, group.nominal_fps, bounds);
   const auto value = [&](const std::string& name) { return value_of(metrics, name); };
-  if (const SessionReport* first = admitted(sessions)) {
+  if (const SessionReport* first = admitted(sessions))
     fmt::format_to(out, "renderer  {}\nencoder   {}\n", first->renderer, first->encoder);
-  }
   fmt::format_to(out, "sessions  {:.0f} of {:.0f} connected, {:.0f} reconnects, {:.0f} errors\n",
                  value("sessions_connected"), value("sessions"), value("reconnects"),
                  value("errors"));
@@ -75,9 +74,8 @@ void append_table(const GroupReport& group, const HoldBounds& bounds, std::strin
                    value(name + "_p50_ms"), value(name + "_p95_ms"), value(name + "_p99_ms"),
                    value(name + "_max_ms"));
   }
-  for (const auto& [what, count] : all_errors(sessions)) {
+  for (const auto& [what, count] : all_errors(sessions))
     fmt::format_to(out, "\n{} x {}", count, what);
-  }
   if (value("errors") > 0.0) text += '\n';
 }
 
@@ -107,9 +105,8 @@ Json to_json(const RunReport& report, const Metrics& metrics, const HoldBounds& 
                 {"nominal_fps", group.nominal_fps},
                 {"error_counts", all_errors(group.sessions)},
                 {"series", series_json(group)}};
-    for (const auto& session : group.sessions) {
+    for (const auto& session : group.sessions)
       one["per_session"].push_back(session_json(*session, group.nominal_fps, bounds));
-    }
     json["groups"].push_back(std::move(one));
   }
   return json;

@@ -87,9 +87,8 @@ Outcome run_scenario(Scenario scenario, const std::vector<std::string>& server_c
   if (server) append(outcome.metrics, server->metrics());
   for (const Requirement& requirement : outcome.requirements) {
     const std::string& name = requirement.metric();
-    if (is_window_metric(name)) {
+    if (is_window_metric(name))
       outcome.metrics.emplace_back(name, window_metric(outcome.report, name));
-    }
   }
   return outcome;
 }

@@ -1,10 +1,7 @@
 #include "tests/load/scenario.h"
 
 #include <csignal>
-#include <fstream>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
@@ -12,13 +9,10 @@
 #include "tests/load/picture_check.h"
 #include "tests/load/server_metrics.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::load {
 namespace {
-
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 class ScenarioFile : public ::testing::Test {
  protected:

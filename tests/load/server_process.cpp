@@ -222,9 +222,8 @@ Metrics ServerProcess::metrics() const {
                      {"server.rss_growth_mb", mean(0.75, 1.0, &UsageSample::server_rss_mb) -
                                                   mean(0.25, 0.5, &UsageSample::server_rss_mb)},
                      {"server.exit_code", exit_code_}};
-  for (auto& metric : change_between(before_, after_.empty() ? before_ : after_, "server.")) {
+  for (auto& metric : change_between(before_, after_.empty() ? before_ : after_, "server."))
     metrics.push_back(std::move(metric));
-  }
   return metrics;
 }
 

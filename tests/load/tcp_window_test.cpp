@@ -1,9 +1,8 @@
 #include "tests/load/tcp_window.h"
 
-#include <cmath>
 #include <deque>
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs::load {
 namespace {

@@ -31,22 +31,18 @@ std::variant<v1::ServerMessage, FrameMessage, WireError> parse_server_message(
   bytes = bytes.subspan(1);
   if (kind == kind_message) {
     v1::ServerMessage message;
-    if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
       return WireError{"a ServerMessage that does not parse"};
-    }
     return message;
   }
-  if (kind != kind_frame) {
+  if (kind != kind_frame)
     return WireError{"kind " + std::to_string(std::to_integer<int>(kind)) + ", neither 1 nor 2"};
-  }
   std::uint32_t length = 0;
-  if (!take_varint(bytes, length) || length > max_header_bytes || length > bytes.size()) {
+  if (!take_varint(bytes, length) || length > max_header_bytes || length > bytes.size())
     return WireError{"a frame whose header length does not fit"};
-  }
   FrameMessage frame;
-  if (!frame.header.ParseFromArray(bytes.data(), static_cast<int>(length))) {
+  if (!frame.header.ParseFromArray(bytes.data(), static_cast<int>(length)))
     return WireError{"a FrameHeader that does not parse"};
-  }
   frame.bitstream = bytes.subspan(length);
   if (frame.bitstream.empty()) return WireError{"a frame without a bitstream"};
   return frame;

@@ -1,6 +1,7 @@
 #include "server/frame_path.h"
 
 #include "tests/server/visit/sessions_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {

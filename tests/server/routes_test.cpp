@@ -2,14 +2,9 @@
 
 #include "server/routes.h"
 
-#include <set>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "server/media/media_type.h"
 #include "server/scenes/tours.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {

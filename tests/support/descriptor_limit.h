@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
+#include <iterator>
+
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -10,6 +14,11 @@ inline int next_descriptor() {
   const int next = ::dup(STDERR_FILENO);
   ::close(next);
   return next;
+}
+
+/// Descriptors of this process, which may be the server too.
+inline std::ptrdiff_t open_descriptors() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
 }
 
 /// For as long as it lives, no descriptor of this process may be `limit` or more.

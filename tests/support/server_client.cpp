@@ -10,6 +10,10 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 
+#include "server/access/access.h"
+#include "tests/support/raw_socket.h"
+#include "tests/support/temporary_folder.h"
+
 namespace catgs::test {
 namespace {
 
@@ -85,6 +89,13 @@ RunningServer::~RunningServer() {
 
 void RunningServer::join() { thread_.join(); }
 
+const RunningServer& shared_server() {
+  static const RunningServer server([](ServerConfig& config) {
+    config.max_sessions = 64;  // those that a case lost keep their places for a while
+  });
+  return server;
+}
+
 namespace {
 
 HttpReply exchange(int port, http::request<http::string_body> request,
@@ -128,6 +139,43 @@ double metric(const RunningServer& server, const std::string& name) {
   const auto at = text.find("\n" + name + " ");
   if (at == std::string::npos) throw std::runtime_error(name + " is not in /metrics");
   return std::stod(text.substr(at + name.size() + 2));
+}
+
+std::string raw_answer(int port, std::string_view request, std::chrono::milliseconds patience) {
+  RawSocket socket(port);
+  socket.send(request);
+  return socket.receive(patience);
+}
+
+namespace {
+
+const std::string link_key(32, 'k');
+
+/// The path of a file with this content, which is there as long as the process.
+std::string lasting_file(const char* name, const std::string& content) {
+  static const TemporaryFolder folder;
+  return folder.write(name, content).string();
+}
+
+}  // namespace
+
+const std::string& link_key_file() {
+  static const std::string path = lasting_file("key", link_key);
+  return path;
+}
+
+std::string make_link(const std::string& role, const std::string& scene, const std::string& id) {
+  return make_link_token({scene, role, 1'000'000'000'000, id}, link_key);
+}
+
+const std::string& static_token_file() {
+  static const std::string path =
+      lasting_file("tokens", std::string("# museum\n") + static_token + "\n");
+  return path;
+}
+
+std::map<std::string, std::string> bearer(const std::string& token) {
+  return {{"authorization", "Bearer " + token}};
 }
 
 struct WireClient::State {
@@ -259,6 +307,30 @@ v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec) {
   hello.set_viewport_height_px(static_cast<std::uint32_t>(height_px));
   hello.add_decoders(codec);
   return message;
+}
+
+v1::ClientMessage hello_by(const std::string& token, const std::string& scene) {
+  v1::ClientMessage message = hello_message(64, 64, v1::CODEC_H264);
+  message.mutable_hello()->set_token(token);
+  message.mutable_hello()->set_scene_id(scene);
+  return message;
+}
+
+v1::ClientMessage bye_message() {
+  v1::ClientMessage message;
+  message.mutable_bye();
+  return message;
+}
+
+v1::Error refusal(int port, const v1::ClientMessage& message) {
+  WireClient client(port);
+  client.send(message);
+  for (v1::Error error;;) {
+    const Received received = client.receive();
+    if (received.closed) return error;
+    if (received.message && received.message->has_welcome()) return {};
+    if (received.message && received.message->has_error()) error = received.message->error();
+  }
 }
 
 v1::ClientMessage pose_message(std::uint64_t pose_id, float x) {

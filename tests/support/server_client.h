@@ -49,6 +49,10 @@ class RunningServer {
   std::thread thread_;
 };
 
+/// One for all cases of a program that change nothing for each other: as by default, with room for
+/// many sessions.
+const RunningServer& shared_server();
+
 struct HttpReply {
   int status = 0;
   std::map<std::string, std::string> headers;  // lower-case names
@@ -62,8 +66,21 @@ HttpReply http_get(int port, const std::string& target,
 HttpReply http_put(int port, const std::string& target, const std::string& body,
                    const std::map<std::string, std::string>& headers = {});
 
+/// Everything that a server answers to `request`, sent as it is, until it is silent for so long.
+std::string raw_answer(int port, std::string_view request,
+                       std::chrono::milliseconds patience = std::chrono::milliseconds(300));
+
 /// The value of a gauge or counter without labels.
 double metric(const RunningServer& server, const std::string& name);
+
+/// A file for --token-key-file, and a link by its key: to a scene or to all of them.
+const std::string& link_key_file();
+std::string make_link(const std::string& role, const std::string& scene = {},
+                      const std::string& id = {});
+/// A file for --token-file, and the token in it.
+const std::string& static_token_file();
+inline constexpr const char* static_token = "open-sesame-1";
+std::map<std::string, std::string> bearer(const std::string& token);
 
 /// Whether the condition comes true. Twenty seconds are a bound against hanging, no measurement.
 template <typename Condition>
@@ -130,7 +147,13 @@ class WireClient {
 };
 
 v1::ClientMessage hello_message(int width_px, int height_px, v1::Codec codec);
+v1::ClientMessage hello_by(const std::string& token, const std::string& scene = {});
+v1::ClientMessage bye_message();
 v1::ClientMessage pose_message(std::uint64_t pose_id, float x);
+
+/// The error with which the server closes the connection of a client that says this; empty if it
+/// welcomes it or closes without one.
+v1::Error refusal(int port, const v1::ClientMessage& message);
 
 /// The hello of a client that was here before; pose 0: without one.
 v1::ClientMessage resuming_hello(const std::string& resume_token, std::uint64_t pose_id = 0);

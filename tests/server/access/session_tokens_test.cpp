@@ -1,8 +1,7 @@
 #include "server/access/session_tokens.h"
 
-#include <gtest/gtest.h>
-
 #include "server/access/signed_token.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

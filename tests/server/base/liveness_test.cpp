@@ -1,16 +1,12 @@
 #include "server/base/liveness.h"
 
-#include <atomic>
 #include <cstdlib>
-#include <future>
 #include <new>
-#include <thread>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "server/base/watchdog.h"
+#include "tests/support/test.h"
 
 namespace {
 
@@ -32,8 +28,6 @@ void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return s
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 /// At a time that passes when the test says so.
 struct LivenessTest : testing::Test {

@@ -1,28 +1,12 @@
 #include "server/base/replace_file.h"
 
-#include <atomic>
-#include <fstream>
-#include <iterator>
-#include <optional>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "render_core/base/error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace std::chrono_literals;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
-using testing::UnorderedElementsAre;
 
 void replace_file(const fs::path& file, std::string_view text) {
   Replacement(file, text, beside_the_scene).take_place_and_keep_old();

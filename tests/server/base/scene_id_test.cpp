@@ -1,8 +1,6 @@
 #include "server/base/scene_id.h"
 
-#include <array>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

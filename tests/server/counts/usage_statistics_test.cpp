@@ -2,38 +2,20 @@
 
 #include "server/counts/usage_statistics.h"
 
-#include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <memory>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
-#include "render_core/base/error.h"
 #include "server/counts/visit_tally.h"
 #include "server/counts/visits_page.h"
+#include "tests/server/counts/a_day.h"
 #include "tests/support/descriptor_limit.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
-
-constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
-constexpr std::int64_t day_s = 86'400;
-constexpr const char* today = "2025-11-25";
 
 class UsageStatisticsTest : public testing::Test {
  protected:
@@ -92,7 +74,7 @@ TEST_F(UsageStatisticsTest, CountsStayFromOneStartToTheNext) {
       << "in the file, and not yet there";
 }
 
-TEST_F(UsageStatisticsTest, WithoutAFolderCountsStayInMemory) {
+TEST_F(UsageStatisticsTest, CountsStayInMemoryWhenThereIsNoFolder) {
   const UsageStatistics statistics({}, counts_, background_);
   counts_.visit("hall", DeviceKind::tablet);
   EXPECT_THAT(statistics.dates(), ElementsAre(today));

@@ -2,21 +2,12 @@
 
 #include "server/counts/visit_counts.h"
 
-#include <map>
-#include <string>
-
-#include <gtest/gtest.h>
-
 #include "server/counts/visit_tally.h"
+#include "tests/server/counts/a_day.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-
-constexpr std::int64_t noon = 1'764'072'000;  // 2025-11-25 12:00:00 UTC
-constexpr std::int64_t day_s = 86'400;
-constexpr const char* today = "2025-11-25";
 
 class VisitCountsTest : public testing::Test {
  protected:
@@ -66,7 +57,7 @@ TEST_F(VisitCountsTest, AStopCountsOnceInAVisit) {
   EXPECT_EQ(stops, (std::map<StopId, std::uint64_t>{{{0, 1}, 2}, {{0, 2}, 1}}));
 }
 
-TEST_F(VisitCountsTest, WithoutTheSettingNothingIsCounted) {
+TEST_F(VisitCountsTest, NothingIsCountedUnlessConfigured) {
   VisitTally tally(nullptr);
   tally.on_show("hall", DeviceKind::desktop, 0, now_);
   tally.reached("hall", DeviceKind::desktop, {0, 0});

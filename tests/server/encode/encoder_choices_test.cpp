@@ -1,6 +1,6 @@
 #include "server/encode/encoder_choices.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

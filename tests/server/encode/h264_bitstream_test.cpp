@@ -1,22 +1,14 @@
 #include "server/encode/h264_bitstream.h"
 
-#include <random>
-#include <string_view>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs::h264 {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
-
 std::vector<std::byte> from_hex(std::string_view hex) {
   std::vector<std::byte> bytes;
-  for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+  for (std::size_t i = 0; i + 1 < hex.size(); i += 2)
     bytes.push_back(std::byte(std::stoul(std::string(hex.substr(i, 2)), nullptr, 16)));
-  }
   return bytes;
 }
 
@@ -115,7 +107,7 @@ TEST(ParseSps, BroadcastHigh) {
   EXPECT_FALSE(sps->vui->restriction);
 }
 
-TEST(ParseSps, WithoutVui) {
+TEST(ParseSps, ReadsAnSpsThatHasNoVui) {
   const auto camera = parse(from_hex(camera_high));
   ASSERT_TRUE(camera);
   EXPECT_EQ(camera->size_px, glm::ivec2(640, 480));
@@ -144,9 +136,8 @@ TEST(ParseSps, SurvivesNoise) {
   for (int round = 0; round < 20000; ++round) {
     auto bytes = from_hex(round % 2 == 0 ? broadcast_high : interlaced_main);
     const int changes = 1 + static_cast<int>(random() % 4);
-    for (int i = 0; i < changes; ++i) {
+    for (int i = 0; i < changes; ++i)
       bytes[1 + random() % (bytes.size() - 1)] = std::byte(random() & 0xFF);
-    }
     const auto sps = parse(bytes);
     const auto rewritten = with_zero_reorder_frames({bytes});
     ASSERT_EQ(sps.has_value(), rewritten.has_value());

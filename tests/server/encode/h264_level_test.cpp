@@ -2,7 +2,7 @@
 
 #include <ostream>
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs::h264 {
 namespace {

@@ -1,8 +1,4 @@
-#include <algorithm>
-#include <cmath>
-
 #include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include "server/encode/decoder.h"
 #include "server/encode/encoder.h"
@@ -10,6 +6,7 @@
 #include "server/encode/jpeg_rate.h"
 #include "server/encode/test_picture.h"
 #include "tests/server/encode/colour.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

@@ -1,6 +1,5 @@
-#include <gtest/gtest.h>
-
 #include "server/encode/encoder.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

@@ -1,16 +1,11 @@
 #include "server/encode/selftest.h"
 
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
 using testing::ContainsRegex;
-using testing::HasSubstr;
-using testing::Not;
 
 TEST(Selftest, PassesAndNamesEveryEncoder) {
   std::ostringstream out;

@@ -1,17 +1,11 @@
 #include "server/films/film_queue.h"
 
-#include <array>
 #include <cstdio>
-#include <filesystem>
-#include <string>
-#include <vector>
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class FilmQueueTest : public testing::Test {
  protected:

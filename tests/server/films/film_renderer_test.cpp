@@ -2,27 +2,15 @@
 
 #include "server/films/film_renderer.h"
 
-#include <atomic>
-#include <chrono>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <string>
-#include <thread>
-
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/thread_pool.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-using ::testing::HasSubstr;
 
 const std::string view = "[0, 0, -6, 0, 0, 0, 1, 60]";
 

@@ -1,22 +1,15 @@
 #include "server/films/film_worker.h"
 
-#include <array>
 #include <cstdlib>
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
 
-#include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/image/png.h"
 #include "render_core/metrics/image_quality.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
@@ -156,7 +149,7 @@ TEST_F(FilmWorker, AFullFolderForResultsIsNamed) {
   };
   const std::string folder = "TMPDIR " + std::filesystem::temp_directory_path().string() + ": ";
   for (const FilmKind kind : {FilmKind::picture, FilmKind::panorama, FilmKind::film})
-    EXPECT_THAT(complaint(kind), testing::StartsWith(folder));
+    EXPECT_THAT(complaint(kind), StartsWith(folder));
 }
 
 TEST_F(FilmWorker, AMissingFolderForResultsIsNamed) {
@@ -164,7 +157,7 @@ TEST_F(FilmWorker, AMissingFolderForResultsIsNamed) {
   const std::string kept = before ? before : "";
   ::setenv("TMPDIR", "/absent", 1);
   EXPECT_THAT([] { ResultFile(); },
-              testing::ThrowsMessage<InputError>(testing::HasSubstr("TMPDIR /absent: ")));
+              testing::ThrowsMessage<InputError>(HasSubstr("TMPDIR /absent: ")));
   before ? ::setenv("TMPDIR", kept.c_str(), 1) : ::unsetenv("TMPDIR");
 }
 

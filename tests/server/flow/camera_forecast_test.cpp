@@ -1,6 +1,6 @@
 #include "server/flow/camera_forecast.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

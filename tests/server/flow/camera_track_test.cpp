@@ -1,11 +1,9 @@
 #include "server/flow/camera_track.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 /// A tour along x at one unit a second.
 PoseSample on_tour(std::int64_t time_us) {

@@ -1,14 +1,11 @@
 #include "server/flow/credit.h"
 
-#include <gtest/gtest.h>
-
 #include "server/base/rate_limit.h"
 #include "server/flow/frame_size.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST(CreditWindow, LimitFollowsTheRoundTrip) {
   struct Case {

@@ -1,11 +1,9 @@
 #include "server/flow/detail_ladder.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr auto interval = 16ms;
 

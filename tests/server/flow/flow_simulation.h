@@ -2,11 +2,9 @@
 
 // A Visit, a link and a client in simulated time.
 
-#include <algorithm>
-#include <map>
-
 #include "tests/server/visit/visit_fixture.h"
 #include "tests/support/simulated_link.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 

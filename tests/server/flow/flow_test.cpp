@@ -2,11 +2,11 @@
 // client. Times are simulated, so that they may be asserted.
 
 #include "tests/server/flow/flow_simulation.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using namespace std::chrono_literals;
 using std::chrono::microseconds;
 using test::FlowScenario;
 using test::FlowSimulation;
@@ -235,7 +235,7 @@ TEST(Flow, AStillForASlowDecoderIsFullSizeToo) {
   EXPECT_GE(simulation.presented(39s, 40s), 0.9 * simulation.presented(29s, 30s));
 }
 
-TEST(FlowControl, WhatIsAcknowledgedStandsInNoLine) {
+TEST(FlowControl, AcknowledgedFramesStandInNoQueue) {
   FlowControl flow;
   flow.set_wish({{1280, 720}, 60, 8'000, false});
   TimePoint now = TimePoint{} + 1h;

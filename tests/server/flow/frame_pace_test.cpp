@@ -2,15 +2,10 @@
 
 #include "server/flow/frame_pace.h"
 
-#include <algorithm>
-#include <random>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 struct Outcome {
   int frames = 0;
@@ -82,7 +77,7 @@ TEST(FramePaceTest, PosesThatComeMeanwhileDoNotPutOffAFrameThatIsDue) {
   EXPECT_EQ(pace.next_start_of_pose(), now) << "it would starve beside sessions with fewer poses";
 }
 
-TEST(FramePaceTest, WithoutAnotherPoseTheNewestIsShownHalfAPoseLater) {
+TEST(FramePaceTest, TheNewestPoseIsShownHalfAPoseLaterWhenNoneFollows) {
   FramePace pace;
   TimePoint now{1h};
   for (int i = 0; i < 100; ++i, now += 10ms) pace.pose_arrived(33ms, now);

@@ -1,11 +1,11 @@
 // When a session's frames are IDRs.
 
 #include "tests/server/visit/visit_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using namespace std::chrono_literals;
 using test::VisitTest;
 
 TEST_F(VisitTest, AsksForAnIdrAfterADrop) {

@@ -1,11 +1,9 @@
 #include "server/flow/quality_ladder.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr QualityLadder::Supply plenty{1e9, 1e12, false};
 constexpr QualityLadder::Supply little{1e3, 1e12, false};

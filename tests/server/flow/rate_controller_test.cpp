@@ -1,11 +1,10 @@
 #include "server/flow/rate_controller.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using namespace std::chrono_literals;
 using std::chrono::microseconds;
 
 constexpr RateController::Limits limits{1e5, 40e6, 10e6};
@@ -109,7 +108,7 @@ TEST(RateController, BeginsAnewAfterNothingPassed) {
   EXPECT_LE(feed.controller.rate(), limits.start / 4);
 }
 
-TEST(RateController, WhatIsLargeOnPurposeIsNoQueueOfItsOwn) {
+TEST(RateController, AFrameLargeOnPurposeIsNoQueue) {
   Feed feed;
   feed.frames(60, 0us);
   const double before = feed.controller.rate();

@@ -1,17 +1,11 @@
 #include "server/net/accept_gate.h"
 
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
+
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
-using testing::HasSubstr;
 
 constexpr int descriptors = 65'536;
 constexpr TimePoint start{};
@@ -42,8 +36,7 @@ class Guests {
 TEST(AcceptGate, LeavesDescriptorsToTheRestOfTheServer) {
   AcceptGate gate(AcceptGate::bounds_for(64));
   EXPECT_FALSE(gate.refusal(1024 - 64 - 1, 1024, "192.0.2.1", start));
-  EXPECT_THAT(gate.refusal(1024 - 64, 1024, "192.0.2.2", start).value_or(""),
-              HasSubstr("960 descriptors are taken"));
+  EXPECT_TRUE(gate.refusal(1024 - 64, 1024, "192.0.2.2", start));
 }
 
 TEST(AcceptGate, UsesNoMoreDescriptorsThanThereAreTablesFor) {
@@ -79,7 +72,6 @@ TEST(AcceptGate, OneAddressHasAThousandOfVeryMany) {
   Guests guests(bounds);
   for (std::size_t i = 0; i < 1024; ++i) ASSERT_TRUE(guests.lets_in("192.0.2.1", i)) << guests.why;
   EXPECT_FALSE(guests.lets_in("192.0.2.1", 1024));
-  EXPECT_THAT(guests.why, HasSubstr("1024 are open already"));
   EXPECT_TRUE(guests.lets_in("192.0.2.2", 1024));
 }
 
@@ -128,7 +120,6 @@ TEST(AcceptGate, ForgetsOnlyAddressesThatHaveNoConnection) {
   }
   EXPECT_TRUE(guests.lets_in("goes", 1));
   EXPECT_FALSE(guests.lets_in("stays", 2));
-  EXPECT_THAT(guests.why, HasSubstr("1 are open already"));
 }
 
 }  // namespace

@@ -1,13 +1,9 @@
 #include "server/net/body_deadline.h"
 
-#include <optional>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr std::size_t mib = 1 << 20;
 

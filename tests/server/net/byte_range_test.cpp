@@ -1,9 +1,8 @@
 #include "server/net/byte_range.h"
 
-#include <string>
-
 #include <fmt/format.h>
-#include <gtest/gtest.h>
+
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
@@ -31,7 +30,7 @@ TEST(ByteRange, BehindTheEndIsEmpty) {
   EXPECT_EQ(range("bytes=-5", 0), "0+0");
 }
 
-TEST(ByteRange, OfAnotherFormIsTheWhole) {
+TEST(ByteRange, AnotherFormMeansTheWholeFile) {
   for (const char* header : {"", "bytes", "bytes=", "bytes=-", "bytes=a-b", "bytes=5", "bytes=5-4",
                              "bytes=1-2,4-5", "bytes=1-2,", "bytes= 1-2", "bytes=--2", "bytes=1--2",
                              "bytes=+1-2", "bytes=0x1-2", "lines=1-2", "Bytes=1-2"})

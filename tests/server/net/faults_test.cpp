@@ -1,15 +1,8 @@
 // Integration: a whole server under which something fails.
 
-#include <atomic>
-#include <filesystem>
-#include <future>
-#include <utility>
-
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -25,40 +18,53 @@
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
-using testing::AllOf;
-using testing::HasSubstr;
-
-/// What a GPU does after a kernel error: nothing, and it says so.
-class FailingExecutor final : public FrameExecutor {
+/// An executor around the working one.
+class WrappedExecutor : public FrameExecutor {
  public:
-  FailingExecutor(std::shared_ptr<FrameExecutor> working, const std::atomic<bool>& fails)
-      : working_(std::move(working)), fails_(fails) {}
+  explicit WrappedExecutor(std::shared_ptr<FrameExecutor> working) : working_(std::move(working)) {}
   [[nodiscard]] int slots() const override { return working_->slots(); }
   void open(std::shared_ptr<Stream> stream, StreamSettings settings,
             std::function<void(StreamOpened)> done) override {
-    if (!fails_) return working_->open(std::move(stream), std::move(settings), std::move(done));
+    working_->open(std::move(stream), std::move(settings), std::move(done));
+  }
+  void submit(FrameJob job, std::function<void(FrameResult)> done) override {
+    working_->submit(std::move(job), std::move(done));
+  }
+  void close(std::shared_ptr<Stream> stream) override { working_->close(std::move(stream)); }
+
+ private:
+  const std::shared_ptr<FrameExecutor> working_;
+};
+
+/// What a GPU does after a kernel error: nothing, and it says so.
+class FailingExecutor final : public WrappedExecutor {
+ public:
+  FailingExecutor(std::shared_ptr<FrameExecutor> working, const std::atomic<bool>& fails)
+      : WrappedExecutor(std::move(working)), fails_(fails) {}
+  void open(std::shared_ptr<Stream> stream, StreamSettings settings,
+            std::function<void(StreamOpened)> done) override {
+    if (!fails_)
+      return WrappedExecutor::open(std::move(stream), std::move(settings), std::move(done));
     StreamOpened refused;
     refused.fault = Fault::device_failed;
     refused.message = "stream: an illegal memory access was encountered";
     done(std::move(refused));
   }
   void submit(FrameJob job, std::function<void(FrameResult)> done) override {
-    if (!fails_) return working_->submit(std::move(job), std::move(done));
+    if (!fails_) return WrappedExecutor::submit(std::move(job), std::move(done));
     FrameResult failed;
     failed.frame.ticket = job.ticket;
     failed.fault = Fault::device_failed;
     failed.message = "blend: an illegal memory access was encountered";
     done(std::move(failed));
   }
-  void close(std::shared_ptr<Stream> stream) override { working_->close(std::move(stream)); }
 
  private:
-  const std::shared_ptr<FrameExecutor> working_;
   const std::atomic<bool>& fails_;
 };
 
@@ -91,31 +97,22 @@ TEST(ServerFaults, EndsForItsSupervisorWhenNoDeviceRendersAnyMore) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), v1::Error::INTERNAL) << "its page comes again, to whom serves then";
   EXPECT_GT(stands.receive_message(v1::ServerMessage::kDrain).drain().deadline_ms(), 0u);
-  try {
-    ended.get();
-    FAIL() << "run() returned as if somebody had asked for it";
-  } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
-    EXPECT_THAT(failure.what(), HasSubstr("no device renders any more: stream: an illegal memory"));
-  }
+  EXPECT_THAT([&] { ended.get(); },  // main() makes it exit status 1
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("no device renders any more: stream: an illegal memory")));
 }
 
 /// Keeps the next frame, as a GPU call does that never returns, or the thread that submits it.
-class StuckExecutor final : public FrameExecutor {
+class StuckExecutor final : public WrappedExecutor {
  public:
-  explicit StuckExecutor(std::shared_ptr<FrameExecutor> working) : working_(std::move(working)) {}
-  [[nodiscard]] int slots() const override { return working_->slots(); }
-  void open(std::shared_ptr<Stream> stream, StreamSettings settings,
-            std::function<void(StreamOpened)> done) override {
-    working_->open(std::move(stream), std::move(settings), std::move(done));
-  }
+  using WrappedExecutor::WrappedExecutor;
   void submit(FrameJob job, std::function<void(FrameResult)> done) override {
     if (keeps_the_frame.exchange(false))
-      kept_ = [this, job, done] { working_->submit(job, done); };
+      kept_ = [this, job, done] { WrappedExecutor::submit(job, done); };
     else
-      working_->submit(std::move(job), std::move(done));
+      WrappedExecutor::submit(std::move(job), std::move(done));
     if (keeps_the_thread.exchange(false)) released_.get_future().wait();
   }
-  void close(std::shared_ptr<Stream> stream) override { working_->close(std::move(stream)); }
   void release_thread() { released_.set_value(); }
   void release_frame() { std::exchange(kept_, nullptr)(); }
 
@@ -123,7 +120,6 @@ class StuckExecutor final : public FrameExecutor {
   std::atomic<bool> keeps_the_thread{false};
 
  private:
-  const std::shared_ptr<FrameExecutor> working_;
   std::function<void()> kept_;
   std::promise<void> released_;
 };
@@ -136,11 +132,8 @@ TEST(ServerFaults, ProbesNameTheThreadThatStandsStill) {
   parts.wrap = [&](std::shared_ptr<FrameExecutor> executor) {
     return stuck = std::make_shared<StuckExecutor>(std::move(executor));
   };
-  ServerConfig config;
-  config.scenes = {"synth:city:2000"};
-  config.port = 0;
+  ServerConfig config = quiet_config();
   config.admin_bind = "127.0.0.1:0";
-  config.threads = 2;
   Server server(config, parts);
   auto ended = std::async(std::launch::async, [&] { server.run(); });
   const Stopped stopped(server);
@@ -173,7 +166,7 @@ TEST(ServerFaults, ProbesNameTheThreadThatStandsStill) {
   ASSERT_TRUE(eventually([&] { return !stuck->keeps_the_thread; }));
   EXPECT_TRUE(healthy()) << "it has moved lately";
   later = 80s;
-  EXPECT_THAT(complaint(), testing::StartsWith("session stalled for 2"));
+  EXPECT_THAT(complaint(), StartsWith("session stalled for 2"));
   EXPECT_EQ(http_get(server.port(), "/healthz").status, 503);
   stuck->release_thread();
   EXPECT_TRUE(eventually(healthy));
@@ -246,7 +239,7 @@ class SecondScene : public testing::Test {
   Metrics metrics_;
 };
 
-TEST_F(SecondScene, ThatNoGpuTakesIsNotLeftToTheProcessors) {
+TEST_F(SecondScene, IsNotLeftToTheProcessorsWhenNoGpuTakesIt) {
   devices_->add(0);  // as the CUDA core does that renders the first scene
   EXPECT_TRUE(std::holds_alternative<ErrorMessage>(wanted_later()));
   EXPECT_EQ(metrics_.scene_loads_failed.Value(), 1.0);

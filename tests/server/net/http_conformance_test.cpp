@@ -1,71 +1,55 @@
 // HTTP by the byte, and crowds: what strangers may send to the port without a token. Real sockets
 // on loopback, a whole server in this process.
 
-#include <filesystem>
-#include <thread>
-
-#include <boost/system/system_error.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/tls.h"
 
 namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-using testing::AllOf;
-using testing::AnyOf;
-using testing::HasSubstr;
-using testing::Not;
-using testing::StartsWith;
 
 constexpr std::string_view page_policy =
     "default-src 'none'; script-src 'self'; worker-src 'self'; connect-src 'self'; img-src 'self' "
     "blob: data:; media-src 'self'; style-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'";
 
-/// Descriptors of this process, which is the server too.
-std::size_t open_descriptors() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
-    ++count;
-  return count;
-}
-
 class HttpConformance : public testing::Test {
  protected:
-  HttpConformance() {
+  static void SetUpTestSuite() {
     // Both ends of a thousand connections; libwebsockets takes what is allowed when it starts.
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
     limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 8192);
     ::setrlimit(RLIMIT_NOFILE, &limit);
-    folder.write("web/index.html", "<!doctype html>the page");
-    folder.write("web/large.bin", std::string(large_bytes, 'l'));
-    folder.write("secret.txt", "the secret");
-    server.emplace([&](ServerConfig& config) {
-      config.client_dir = (folder / "web").string();
+    folder.emplace();
+    folder->write("web/index.html", "<!doctype html>the page");
+    folder->write("web/large.bin", std::string(large_bytes, 'l'));
+    folder->write("secret.txt", "the secret");
+    server.emplace([](ServerConfig& config) {
+      config.client_dir = (*folder / "web").string();
       config.max_sessions = 64;
       config.max_sessions_per_address = 150;  // connections follow it (AcceptGate::bounds_for)
     });
   }
-
-  std::string host() const { return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\n"; }
-  /// Everything that the server answers to `request`, sent as it is.
-  std::string answer(const std::string& request) const {
-    RawSocket socket(server->port());
-    socket.send(request);
-    return socket.receive(300ms);
+  static void TearDownTestSuite() {
+    server.reset();
+    folder.reset();
   }
-  std::string answer_to_path(const std::string& path) const {
+
+  static std::string host() { return "Host: 127.0.0.1:" + std::to_string(server->port()) + "\r\n"; }
+  /// Everything that the server answers to `request`, sent as it is.
+  static std::string answer(const std::string& request) {
+    return raw_answer(server->port(), request);
+  }
+  static std::string answer_to_path(const std::string& path) {
     return answer("GET " + path + " HTTP/1.1\r\n" + host() + "\r\n");
   }
-  void expect_alive() const {
+  static void expect_alive() {
     EXPECT_EQ(http_get(server->port(), "/healthz").status, 200);
     WireClient good(server->port());
     good.greet();
@@ -73,7 +57,7 @@ class HttpConformance : public testing::Test {
     EXPECT_FALSE(good.receive_frame().bitstream.empty());
   }
   /// The server notices closed sockets a little later.
-  static bool falls_to(std::size_t descriptors) {
+  static bool falls_to(std::ptrdiff_t descriptors) {
     for (int looks = 0; looks < 100; ++looks) {
       if (open_descriptors() <= descriptors) return true;
       std::this_thread::sleep_for(50ms);
@@ -82,16 +66,19 @@ class HttpConformance : public testing::Test {
   }
 
   static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
-  const TemporaryFolder folder;
-  std::optional<RunningServer> server;
+  static std::optional<TemporaryFolder> folder;
+  static std::optional<RunningServer> server;
 };
+
+std::optional<TemporaryFolder> HttpConformance::folder;
+std::optional<RunningServer> HttpConformance::server;
 
 TEST_F(HttpConformance, NoPathLeadsOutOfTheClient) {
   for (const char* path :
        {"/../secret.txt", "/%2e%2e/secret.txt", "/%2e%2e%2fsecret.txt", "/..%5csecret.txt",
         "/%252e%252e/secret.txt", "/.%00./secret.txt", "/..;/secret.txt", "//../secret.txt",
-        "/./../secret.txt", "/index.html/../../secret.txt", "/%c0%ae%c0%ae/secret.txt",
-        "http://127.0.0.1/../secret.txt", "file:///etc/passwd", "*",
+        "/..%2fsecret.txt", "//etc/passwd", "/./../secret.txt", "/index.html/../../secret.txt",
+        "/%c0%ae%c0%ae/secret.txt", "http://127.0.0.1/../secret.txt", "file:///etc/passwd", "*",
         "/api/scenes/../secret.txt/tours",
         "/api/scenes/%2e%2e%2f%2e%2e%2fetc%2fpasswd/poster.jpg"}) {
     const std::string reply = answer_to_path(path);
@@ -152,9 +139,8 @@ TEST_F(HttpConformance, OtherMethodsAreRefused) {
 }
 
 TEST_F(HttpConformance, AHeadHasNoBody) {
-  const std::string head = answer("HEAD / HTTP/1.1\r\n" + host() + "\r\n");
-  EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
-  EXPECT_THAT(head, Not(HasSubstr("the page")));
+  EXPECT_THAT(answer("HEAD / HTTP/1.1\r\n" + host() + "\r\n"),
+              AllOf(StartsWith("HTTP/1.1 200"), EndsWith("\r\n\r\n")));
 }
 
 TEST_F(HttpConformance, ALargeAnswerComesWhole) {
@@ -225,29 +211,18 @@ TEST_F(HttpConformance, AConnectionAnswersOneRequest) {
   expect_alive();
 }
 
-/// A proxy in front counts bodies: a request hidden in one must not be answered here.
+/// A proxy in front counts bodies: a request hidden in one must not be answered here. libwebsockets
+/// reads a length by its first 30 characters, or takes none, or one that is wrong.
 TEST_F(HttpConformance, ABodyIsNoSecondRequest) {
   const std::string hidden = "GET /healthz HTTP/1.1\r\n" + host() + "\r\n";
-  const std::string length = "Content-Length: " + std::to_string(hidden.size()) + "\r\n\r\n";
-  for (const char* method : {"GET", "HEAD"})
-    EXPECT_THAT(answer(std::string(method) + " /nowhere HTTP/1.1\r\n" + host() + length + hidden),
-                Not(HasSubstr("200 OK")))
-        << method;
-  EXPECT_THAT(answer("GET /nowhere HTTP/1.1\r\n" + host() + "Transfer-Encoding: chunked\r\n\r\n" +
-                     "0\r\n\r\n"),
-              Not(HasSubstr("200 OK")));
-  expect_alive();
-}
-
-/// libwebsockets reads it by its first 30 characters, or takes none, or one that is wrong.
-TEST_F(HttpConformance, ALengthOfManyZerosHidesNoSecondRequest) {
-  const std::string hidden = "GET /healthz HTTP/1.1\r\n" + host() + "\r\n";
-  const std::string length =
-      "Content-Length: " + std::string(40, '0') + std::to_string(hidden.size()) + "\r\n\r\n";
-  for (const char* method : {"GET", "HEAD", "PUT"})
-    EXPECT_THAT(answer(std::string(method) + " /nowhere HTTP/1.1\r\n" + host() + length + hidden),
-                Not(HasSubstr("200 OK")))
-        << method;
+  const std::string size = std::to_string(hidden.size()) + "\r\n\r\n" + hidden;
+  for (const std::string& body :
+       {"Content-Length: " + size, "Content-Length: " + std::string(40, '0') + size,
+        std::string("Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n")})
+    for (const std::string method : {"GET", "HEAD", "PUT"})
+      EXPECT_THAT(answer(method + " /nowhere HTTP/1.1\r\n" + host() + body),
+                  Not(HasSubstr("200 OK")))
+          << method << ": " << body;
   expect_alive();
 }
 
@@ -277,9 +252,6 @@ TEST_F(HttpConformance, NothingButAWebsocketIsUpgradedTo) {
     EXPECT_THAT(socket.receive(300ms), Not(HasSubstr(" 101 "))) << request;
     EXPECT_TRUE(socket.closed_within(20s)) << request;
   }
-  EXPECT_THAT(answer(get + "Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\n"
-                           "HTTP2-Settings: AAMAAABkAAQAAP__\r\n\r\n"),
-              AllOf(HasSubstr(" 400 "), HasSubstr("not h2c")));
   expect_alive();
 }
 
@@ -305,12 +277,12 @@ TEST_F(HttpConformance, HeadersHaveAnEnd) {
 /// (server/net/net_server.cpp), `grace` 10 (server/net/body_deadline.h) and `piece_timeout_s` 30
 /// (server/net/lws_http.cpp).
 TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
-  write_self_signed(folder / "certificate.pem", folder / "key.pem");
+  write_self_signed(*folder / "certificate.pem", *folder / "key.pem");
   const RunningServer https([&](ServerConfig& config) {
-    config.tls_cert = (folder / "certificate.pem").string();
-    config.tls_key = (folder / "key.pem").string();
+    config.tls_cert = (*folder / "certificate.pem").string();
+    config.tls_key = (*folder / "key.pem").string();
   });
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   {
     std::vector<RawSocket> slow;
     for (int i = 0; i < 20; ++i) {
@@ -360,7 +332,7 @@ TEST_F(HttpConformance, SlowAndSilentPeersAreHungUp) {
 }
 
 TEST_F(HttpConformance, AThousandConnectionsLeaveRoomForOneMore) {
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   {
     std::vector<RawSocket> crowd;
     for (int i = 0; i < 1000; ++i) {
@@ -389,7 +361,7 @@ TEST_F(HttpConformance, AStormOfReconnectsLeavesNothingBehind) {
     WireClient first(server->port());
     resume_token = first.greet().resume_token();
   }
-  const std::size_t before = open_descriptors();
+  const std::ptrdiff_t before = open_descriptors();
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&, t] {

@@ -1,18 +1,11 @@
 #include "server/net/http.h"
 
-#include <filesystem>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "render_core/base/error.h"
 #include "server/net/static_files.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using testing::HasSubstr;
 
 TEST(Origin, OwnPagesAndListedOnesMayConnect) {
   EXPECT_TRUE(origin_allowed("", "a.example", {})) << "no browser";
@@ -29,7 +22,7 @@ TEST(Origin, OwnPagesAndListedOnesMayConnect) {
 TEST(Precondition, IsAboutWhatIsThere) {
   const std::string tag = etag_of("a tour");
   EXPECT_NE(tag, etag_of("a tour "));
-  EXPECT_THAT(tag, testing::MatchesRegex("\"[0-9a-f]{16}\""));
+  EXPECT_THAT(tag, MatchesRegex("\"[0-9a-f]{16}\""));
   EXPECT_TRUE((Precondition{}.holds(tag)));
   EXPECT_TRUE((Precondition{}.holds("")));
   EXPECT_TRUE((Precondition{tag, ""}.holds(tag)));

@@ -1,19 +1,14 @@
 // Integration: what keeps the thread of libwebsockets busy, and what follows when it fails. A whole
 // server in this process.
 
-#include <atomic>
-#include <filesystem>
-#include <future>
-#include <vector>
-
 #include <dlfcn.h>
-#include <gtest/gtest.h>
 
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/random_cloud.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/tls.h"
 
 namespace {
@@ -35,8 +30,6 @@ extern "C" int lws_service(lws_context* context, int timeout_ms) {
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
-
 TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
   const ServerConfig config = quiet_config();
   Server server(config);
@@ -46,12 +39,8 @@ TEST(ServerFaults, EndsForItsSupervisorWhenTheNetworkThreadFails) {
   EXPECT_EQ(http_get(server.port(), "/healthz").status, 200);
   network_fails = true;
   waker.send("G");
-  try {
-    ended.get();
-    FAIL() << "run() returned as if somebody had asked for it";
-  } catch (const std::runtime_error& failure) {  // main() makes it exit status 1
-    EXPECT_STREQ(failure.what(), "the network thread failed");
-  }
+  EXPECT_THAT([&] { ended.get(); },  // main() makes it exit status 1
+              ThrowsMessage<std::runtime_error>("the network thread failed"));
   network_fails = false;
 }
 
@@ -98,41 +87,46 @@ int services_in(std::chrono::milliseconds time) {
 /// One connection that takes no more of its answer while libwebsockets has something to read of it.
 class UnreadAnswer : public testing::Test {
  protected:
-  UnreadAnswer() {
-    folder_.write("index.html", "<!doctype html>");
-    folder_.write("large.bin", std::string(large_bytes, 'l'));
-    server_.emplace([&](ServerConfig& config) { config.client_dir = folder_.path().string(); });
-    socket_.emplace(server_->port());
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    folder_->write("index.html", "<!doctype html>");
+    folder_->write("large.bin", std::string(large_bytes, 'l'));
+    server_ = std::make_unique<RunningServer>(
+        [](ServerConfig& config) { config.client_dir = folder_->path().string(); });
+  }
+  static void TearDownTestSuite() {
+    server_.reset();
+    folder_.reset();
   }
   void expect_whole_answer() {
-    const std::string reply = socket_->receive(5s);
+    const std::string reply = socket_.receive(5s);
     EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, large_bytes);
   }
 
   static constexpr std::size_t large_bytes = 16 << 20;  // more than sockets hold
   static constexpr std::string_view request = "GET /large.bin HTTP/1.1\r\nHost: localhost\r\n\r\n";
-  const TemporaryFolder folder_;
-  std::optional<RunningServer> server_;
-  std::optional<RawSocket> socket_;
+  static inline std::unique_ptr<TemporaryFolder> folder_;
+  static inline std::unique_ptr<RunningServer> server_;
+  RawSocket socket_{server_->port()};
 };
 
 TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatCameWithTheRequest) {
-  socket_->send(std::string(request) + "x");
+  socket_.send(std::string(request) + "x");
   EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
   expect_whole_answer();
 }
 
 TEST_F(UnreadAnswer, KeepsNoThreadBusyByBytesThatComeLater) {
-  socket_->send(request);
+  socket_.send(request);
   std::string head;
-  ASSERT_TRUE(socket_->receive_until("\r\n\r\n", head));
-  socket_->send(std::string(100'000, 'x'));
+  ASSERT_TRUE(socket_.receive_until("\r\n\r\n", head));
+  socket_.send(std::string(100'000, 'x'));
   EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
 }
 
 TEST_F(UnreadAnswer, KeepsNoThreadBusyWhereTheClientHasNoMoreToSay) {
-  socket_->send(request);
-  socket_->end_sending();
+  socket_.send(request);
+  socket_.end_sending();
   EXPECT_TRUE(eventually([] { return services_in(250ms) < 25; }));
   expect_whole_answer();
 }

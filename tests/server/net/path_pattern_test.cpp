@@ -1,6 +1,6 @@
 #include "server/net/path_pattern.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {

@@ -1,22 +1,6 @@
 // Integration: the program in a process of its own, and signals.
 
-#include <algorithm>
-#include <chrono>
-#include <fstream>
-#include <future>
-#include <iterator>
-#include <map>
-#include <memory>
-#include <sstream>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
-
 #include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <signal.h>
 #include <sys/resource.h>
@@ -24,19 +8,14 @@
 #include <unistd.h>
 
 #include "render_core/scene/files/save_scene.h"
-#include "server/access/access.h"
 #include "server/net/visitor_address.h"
 #include "tests/render_core/scene/random_cloud.h"
-#include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 /// catgs-server on a port of the system's choice, serving synth:city. Its end kills it.
 class Program {
@@ -118,8 +97,7 @@ TEST(ServerProgram, EndsCleanlyOnSigterm) {
   const std::string scenes = http_get(program.port(), "/api/scenes").body;
   EXPECT_EQ(scenes.find("\"id\""), scenes.rfind("\"id\"")) << scenes;
   program.signal(SIGTERM);
-  while (http_get(program.port(), "/readyz").status != 503)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  while (http_get(program.port(), "/readyz").status != 503) std::this_thread::sleep_for(10ms);
   EXPECT_EQ(http_get(program.port(), "/healthz").status, 200) << "proxies see it go";
   EXPECT_EQ(program.exit_status(), 0);
 }
@@ -160,7 +138,7 @@ TEST(ServerProgram, SupervisorsTellAFaultFromAMistake) {
 TEST(ServerProgram, DoesNotStartWithDescriptorsForItsOwnWorkAlone) {
   Program refused({}, "ulimit -n", 64);
   EXPECT_THAT(refused.log(), AllOf(HasSubstr("64 descriptors are allowed, and at least "),
-                                   testing::Not(HasSubstr("http://"))));
+                                   Not(HasSubstr("http://"))));
   EXPECT_EQ(refused.exit_status(), 2);
   Program serves({}, "Ctrl-C", 128);
   EXPECT_EQ(http_get(serves.port(), "/healthz").status, 200);
@@ -193,20 +171,13 @@ TEST(ServerProgram, EveryLineOfAJsonLogSaysWhatHappenedToWhom) {
     const v1::Welcome welcome = visitor.greet();
     visitor.present();
     WireClient spectator(program.port());
-    v1::ClientMessage watching = hello_message(160, 96, v1::CODEC_H264);
+    v1::ClientMessage watching = hello_by("");
     watching.mutable_hello()->set_watch(welcome.watch_token());
     spectator.greet(watching);
-    WireClient lost(program.port());
-    v1::ClientMessage elsewhere = hello_message(160, 96, v1::CODEC_H264);
-    elsewhere.mutable_hello()->set_scene_id("attic");
-    lost.send(elsewhere);
-    lost.receive_until_closed();
+    refusal(program.port(), hello_by("", "attic"));
     visitor.close(1001);
   }
-  RawSocket stranger(program.port());
-  stranger.send("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
-  std::string answer;
-  stranger.receive_until("\r\n", answer);
+  raw_answer(program.port(), "POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
   program.read_log("\"code\":\"405\"");
   program.read_log("\"event\":\"session_ended\"");
   program.signal(SIGTERM);
@@ -234,14 +205,13 @@ TEST(ServerProgram, EveryLineOfAJsonLogSaysWhatHappenedToWhom) {
 }
 
 TEST(ServerProgram, TheAddressThatItPrintsOpens) {
-  const TemporaryFolder folder;
-  const std::string tokens = folder.write("tokens", "open-sesame-1\n").string();
+  const std::string tokens = static_token_file();
   const auto printed = [](const Program& program) {
     const std::string log = program.log().substr(program.log().find("open http://") + 5);
     return log.substr(0, log.find(' '));
   };
   Program local({"--token-file", tokens}, "a line of");
-  EXPECT_THAT(printed(local), testing::MatchesRegex("http://127.0.0.1:[0-9]+/#token=TOKEN"));
+  EXPECT_THAT(printed(local), MatchesRegex("http://127.0.0.1:[0-9]+/#token=TOKEN"));
   EXPECT_THAT(local.log(), HasSubstr("visitors need a TOKEN in that address: a line of " + tokens));
   Program open({"--bind", "0.0.0.0", "--open", "--log-format", "json"}, "Ctrl-C");
   const std::string address = printed(open).substr(std::string("http://").size());
@@ -263,13 +233,6 @@ TEST(ServerProgram, AnOptionTakesItsOwnValueAndNoScene) {
   EXPECT_EQ(listed.at("scenes").size(), 5u) << listed;
 }
 
-TEST(ServerProgram, AStartThatFailsIsALineOfTheJsonLog) {
-  Program refused({"--log-format", "json", "--scene", "nowhere.ply"}, "never said");
-  EXPECT_EQ(refused.exit_status(), 2);
-  EXPECT_TRUE(by_event(refused.log()).contains("start_failed"));
-}
-
-/// libwebsockets has a line about each head that is too long.
 TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
   Program program({"token"}, "--help)");
   EXPECT_THAT(program.log(), HasSubstr("--token-key-file is required"));
@@ -278,8 +241,7 @@ TEST(ServerProgram, AMistakeInACommandNamesItsOwnHelp) {
 }
 
 TEST(ServerProgram, ATokenForANameSaysWhatThatMeans) {
-  const TemporaryFolder folder;
-  const std::string key = folder.write("key", std::string(32, 'k')).string();
+  const std::string key = link_key_file();
   Program named({"token", "--token-key-file", key, "--scene", "hall"}, "one file.\n");
   EXPECT_THAT(named.log(), HasSubstr("\"hall\" is a name"));
   EXPECT_EQ(named.exit_status(), 0);
@@ -296,48 +258,33 @@ TEST(ServerProgram, ASecondSigtermEndsTheDrainAtOnce) {
   WireClient client(program.port());
   client.greet();
   program.signal(SIGTERM);
-  while (http_get(program.port(), "/readyz").status != 503)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  while (http_get(program.port(), "/readyz").status != 503) std::this_thread::sleep_for(10ms);
   program.signal(SIGTERM);
   EXPECT_EQ(program.exit_status(), 1) << "somebody did not want to wait: visitors were cut off";
 }
 
-/// Settings with which a later process knows the tokens of an earlier one.
-std::vector<std::string> with_key(const TemporaryFolder& folder) {
-  return {"--resume-key-file", folder.write("key", "0123456789abcdef0123456789abcdef\n").string(),
-          "--drain-deadline", "1"};
-}
-
-TEST(ServerProgram, SessionsResumeAfterSigtermAndRestart) {
-  const TemporaryFolder folder;
-  auto program = std::make_unique<Program>(with_key(folder));
-  WireClient client(program->port());
-  const v1::Welcome welcome = client.greet();
-  program->signal(SIGTERM);
-  client.receive_message(v1::ServerMessage::kDrain);
-  EXPECT_EQ(client.receive_until_closed().close_code, 1001) << "it stayed until the deadline";
-  EXPECT_EQ(program->exit_status(), 0);
-  program = std::make_unique<Program>(with_key(folder));
-  WireClient again(program->port());
-  EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 7)).session_id(),
-            welcome.session_id());
-  EXPECT_EQ(again.receive_frame().header.pose_id(), 7u);
-}
-
-TEST(ServerProgram, SessionsResumeAfterItWasKilled) {
-  const TemporaryFolder folder;
-  auto program = std::make_unique<Program>(with_key(folder));
-  WireClient client(program->port());
-  const v1::Welcome welcome = client.greet();
-  client.send_pose(1);
-  client.receive_frame();
-  program->signal(SIGKILL);
-  EXPECT_EQ(program->exit_status(), -1);
-  program = std::make_unique<Program>(with_key(folder));
-  WireClient again(program->port());
-  EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 2)).session_id(),
-            welcome.session_id());
-  EXPECT_EQ(again.receive_frame().header.pose_id(), 2u);
+TEST(ServerProgram, SessionsResumeAfterSigtermOrSigkillAndRestart) {
+  // With its key a later process knows the tokens of an earlier one.
+  const std::vector<std::string> settings = {"--resume-key-file", link_key_file(),
+                                             "--drain-deadline", "1"};
+  for (const int number : {SIGTERM, SIGKILL}) {
+    auto program = std::make_unique<Program>(settings);
+    WireClient client(program->port());
+    const v1::Welcome welcome = client.greet();
+    client.send_pose(1);
+    client.receive_frame();
+    program->signal(number);
+    if (number == SIGTERM) {
+      client.receive_message(v1::ServerMessage::kDrain);
+      EXPECT_EQ(client.receive_until_closed().close_code, 1001) << "it stayed until the deadline";
+    }
+    EXPECT_EQ(program->exit_status(), number == SIGTERM ? 0 : -1);
+    program = std::make_unique<Program>(settings);
+    WireClient again(program->port());
+    EXPECT_EQ(again.greet(resuming_hello(welcome.resume_token(), 7)).session_id(),
+              welcome.session_id());
+    EXPECT_EQ(again.receive_frame().header.pose_id(), 7u);
+  }
 }
 
 TEST(ServerProgram, EndsCleanlyAlthoughItWasStoppedWhileItDrains) {
@@ -347,7 +294,7 @@ TEST(ServerProgram, EndsCleanlyAlthoughItWasStoppedWhileItDrains) {
   program.signal(SIGTERM);
   program.signal(SIGSTOP);
   std::jthread later([&] {
-    std::this_thread::sleep_for(std::chrono::seconds(3));  // longer than the whole drain
+    std::this_thread::sleep_for(3s);  // longer than the whole drain
     program.signal(SIGCONT);
   });
   client.receive_message(v1::ServerMessage::kDrain);
@@ -365,7 +312,7 @@ TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {
   program.signal(SIGSTOP);
   client.reset();  // as one does that hears nothing any more
   std::jthread later([&] {
-    std::this_thread::sleep_for(std::chrono::seconds(1));
+    std::this_thread::sleep_for(1s);
     program.signal(SIGCONT);
   });
   WireClient again(program.port());  // answered once the server goes on
@@ -377,11 +324,10 @@ TEST(ServerProgram, SessionsGoOnAfterItWasStopped) {
 TEST(ServerProgram, OneOfTwoOverAFolderSavesAndTheOtherSaysSo) {
   const TemporaryFolder folder;
   save_scene(random_cloud(100, 0), folder / "hall.ply");
-  const std::string key(32, 'k'), scene = (folder / "hall.ply").string();
-  const std::vector<std::string> settings = {"--scene", scene, "--token-key-file",
-                                             folder.write("key", key).string()};
+  const std::vector<std::string> settings = {"--scene", (folder / "hall.ply").string(),
+                                             "--token-key-file", link_key_file()};
   const Program one(settings), other(settings);
-  const std::string author = "Bearer " + make_link_token({"", "author", 1'000'000'000'000}, key);
+  const std::string author = "Bearer " + make_link("author");
   std::string tag;
   for (int round = 0; round < 25; ++round) {
     const auto save = [&](const Program& program, const std::string& title) {

@@ -1,21 +1,14 @@
 // Integration: what becomes of sessions when sockets are lost, the house is full or the server
 // goes. Real sockets on loopback, whole servers in this process.
 
-#include <algorithm>
-#include <filesystem>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/descriptor_limit.h"
 #include "tests/support/server_client.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using testing::HasSubstr;
 
 nlohmann::json sessions(const RunningServer& server) {
   return nlohmann::json::parse(http_get(server.admin_port(), "/api/sessions").body);
@@ -69,53 +62,28 @@ TEST(SessionLifeOnSockets, ASecondSocketTakesTheSessionOver) {
   EXPECT_TRUE(eventually([&] { return sessions(server).size() == 1; }));
 }
 
-TEST(SessionLifeOnSockets, WhoSaysGoodbyeIsNotWaitedFor) {
+TEST(SessionLifeOnSockets, AClientThatSaysGoodbyeIsNotWaitedFor) {
   RunningServer server;
   WireClient polite(server.port());
   polite.greet();
   WireClient closed_page(server.port());
   closed_page.greet();
   ASSERT_TRUE(eventually([&] { return sessions(server).size() == 2; }));
-  v1::ClientMessage bye;
-  bye.mutable_bye();
-  polite.send(bye);
+  polite.send(bye_message());
   polite.receive_until_closed();
   closed_page.close(1001);
   ASSERT_TRUE(eventually([&] { return sessions(server).empty(); }));
   EXPECT_EQ(metric(server, "catgs_sessions"), 0);
 }
 
-TEST(SessionLifeOnSockets, AServerOfTheSameFleetGoesOn) {
-  const TemporaryFolder folder;
-  const auto key = folder.write("key", "0123456789abcdef0123456789abcdef\n").string();
-  const auto in_fleet = [&](ServerConfig& config) { config.resume_key_file = key; };
-  RunningServer a(in_fleet);
-  RunningServer b(in_fleet);
-  RunningServer stranger;
-  WireClient first(a.port());
-  const v1::Welcome welcome = first.greet();
-  WireClient second(b.port());
-  EXPECT_EQ(second.greet(resuming_hello(welcome.resume_token(), 9)).session_id(),
-            welcome.session_id());
-  EXPECT_EQ(second.receive_frame().header.pose_id(), 9u);
-  WireClient third(stranger.port());
-  EXPECT_NE(third.greet(resuming_hello(welcome.resume_token(), 9)).session_id(),
-            welcome.session_id());
-  EXPECT_EQ(third.receive_frame().header.pose_id(), 9u) << "the pose is the client's own";
-}
+void in_fleet(ServerConfig& config) { config.resume_key_file = link_key_file(); }
 
 TEST(SessionLifeOnSockets, AResumeTokenOpensNoDoorByItself) {
-  const TemporaryFolder folder;
-  const auto tokens = folder.write("tokens", "open-sesame-1\n");
-  RunningServer server([&](ServerConfig& config) { config.token_file = tokens.string(); });
+  RunningServer server([&](ServerConfig& config) { config.token_file = static_token_file(); });
   WireClient guest(server.port());
-  const v1::Welcome welcome = guest.greet(64, 64, v1::CODEC_H264, "open-sesame-1");
-  WireClient thief(server.port());
-  thief.send(resuming_hello(welcome.resume_token()));
-  std::optional<v1::Error> error;
-  thief.receive_until_closed(&error);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), v1::Error::UNAUTHORIZED);
+  const v1::Welcome welcome = guest.greet(hello_by(static_token));
+  EXPECT_EQ(refusal(server.port(), resuming_hello(welcome.resume_token())).code(),
+            v1::Error::UNAUTHORIZED);
   guest.send_pose(1);
   EXPECT_TRUE(guest.receive_frame().header.idr()) << "the guest was not disturbed";
 }
@@ -141,7 +109,6 @@ TEST(SessionLifeOnSockets, WaitsInLineForAPlace) {
   EXPECT_EQ(refused.receive_until_closed(&error).close_code, 1013);
   ASSERT_TRUE(error);
   EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
-  EXPECT_THAT(error->message(), HasSubstr("2 wait"));
 
   host->close(1001);
   waiting[0]->receive_message(v1::ServerMessage::kWelcome);
@@ -153,7 +120,7 @@ TEST(SessionLifeOnSockets, WaitsInLineForAPlace) {
   waiting[1]->receive_message(v1::ServerMessage::kWelcome);
 }
 
-TEST(SessionLifeOnSockets, WhoGivesUpWaitingMakesRoom) {
+TEST(SessionLifeOnSockets, AClientThatGivesUpWaitingMakesRoom) {
   RunningServer server([](ServerConfig& config) {
     config.max_sessions = 1;
     config.max_queue = 1;
@@ -184,27 +151,6 @@ int stream(WireClient& client, std::uint64_t frames) {
   return in_motion;
 }
 
-TEST(SessionLifeOnSockets, AdmitsByWhatFramesWereMeasuredToCost) {
-  RunningServer server([](ServerConfig& config) {
-    config.max_sessions = 100;
-    config.min_fps = 240;
-    config.fps = 240;
-  });
-  WireClient small(server.port());
-  small.greet(320, 180);
-  stream(small, 20);
-  ASSERT_TRUE(eventually([&] { return sessions(server)[0].at("frames_sent") >= 20; }));
-  // 144 times the pixels, 240 times a second: no two threads can do that.
-  WireClient huge(server.port());
-  huge.send(hello_message(3840, 2160, v1::CODEC_H264));
-  const auto answer = huge.receive().message;
-  ASSERT_TRUE(answer);
-  // A slow machine has no room for any of its pixels beside the small one.
-  if (answer->has_queue()) return;
-  ASSERT_TRUE(answer->has_welcome()) << answer->ShortDebugString();
-  EXPECT_LT(answer->welcome().config().width_px(), 3840u);
-}
-
 TEST(SessionLifeOnSockets, TellsWhatASessionTakesAndWhereItsTimeGoes) {
   RunningServer server;
   WireClient client(server.port());
@@ -233,7 +179,7 @@ TEST(SessionLifeOnSockets, TellsWhatASessionTakesAndWhereItsTimeGoes) {
                 HasSubstr("catgs_frame_stage_seconds_count{stage=\"" + std::string(stage) + "\"}"));
   EXPECT_GE(metric(server, "catgs_pose_to_frame_seconds_count"), in_motion);
   EXPECT_EQ(metric(server, "catgs_motion_to_photon_seconds_count"), 20);
-  EXPECT_THAT(metrics, testing::Not(HasSubstr(id))) << "no label names a session";
+  EXPECT_THAT(metrics, Not(HasSubstr(id))) << "no label names a session";
 }
 
 TEST(SessionLifeOnSockets, LostSessionsCountForTheirAddress) {
@@ -244,21 +190,13 @@ TEST(SessionLifeOnSockets, LostSessionsCountForTheirAddress) {
     token = client.greet().resume_token();
   }
   ASSERT_TRUE(eventually([&] { return metric(server, "catgs_sessions_lost") == 1; }));
-  WireClient another(server.port());
-  another.send(hello_message(160, 96, v1::CODEC_H264));
-  std::optional<v1::Error> error;
-  another.receive_until_closed(&error);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code(), v1::Error::SERVER_FULL);
+  EXPECT_EQ(refusal(server.port(), hello_by("")).code(), v1::Error::SERVER_FULL);
   ASSERT_TRUE(eventually([&] { return metric(server, "catgs_connections") == 0; }));
   WireClient back(server.port());
   EXPECT_NO_THROW(back.greet(resuming_hello(token)));
 }
 
 TEST(SessionLifeOnSockets, FramesGoOnUntilTheClientHasMoved) {
-  const TemporaryFolder folder;
-  const auto key = folder.write("key", "0123456789abcdef0123456789abcdef\n").string();
-  const auto in_fleet = [&](ServerConfig& config) { config.resume_key_file = key; };
   RunningServer old_server(in_fleet);
   RunningServer new_server(in_fleet);
   WireClient old_link(old_server.port());
@@ -274,16 +212,17 @@ TEST(SessionLifeOnSockets, FramesGoOnUntilTheClientHasMoved) {
   WireClient new_link(new_server.port());
   EXPECT_EQ(new_link.greet(resuming_hello(welcome.resume_token(), 3)).session_id(),
             welcome.session_id());
-  EXPECT_TRUE(new_link.receive_frame().header.idr());
-  v1::ClientMessage bye;
-  bye.mutable_bye();
-  old_link.send(bye);
+  const auto first = new_link.receive_frame().header;
+  EXPECT_TRUE(first.idr());
+  EXPECT_EQ(first.pose_id(), 3u);
+  WireClient elsewhere(shared_server().port());
+  EXPECT_NE(elsewhere.greet(resuming_hello(welcome.resume_token(), 9)).session_id(),
+            welcome.session_id())
+      << "a server of another key";
+  EXPECT_EQ(elsewhere.receive_frame().header.pose_id(), 9u) << "the pose is the client's own";
+  old_link.send(bye_message());
   EXPECT_EQ(old_link.receive_until_closed().close_code, 1000);
   old_server.join();  // nobody is left, so it does not wait for the deadline
-}
-
-std::ptrdiff_t open_descriptors() {
-  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
 }
 
 TEST(SessionLifeOnSockets, NothingLeaksOverManyLossesAndReturns) {

@@ -1,51 +1,28 @@
 // Integration: clients that look on at a session, or follow it. Real sockets on loopback, a whole
 // server in this process.
 
-#include <atomic>
-#include <map>
-#include <thread>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "server/access/access.h"
 #include "tests/support/server_client.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
 v1::ClientMessage watching_hello(const std::string& watch_token, const std::string& token = {}) {
-  v1::ClientMessage message = hello_message(64, 64, v1::CODEC_H264);
+  v1::ClientMessage message = hello_by(token);
   message.mutable_hello()->set_watch(watch_token);
-  message.mutable_hello()->set_token(token);
   return message;
 }
 
-/// A server that visitors enter by links.
-class ServerOfLinks {
- public:
-  [[nodiscard]] std::string link(const std::string& role) const {
-    return make_link_token({"city", role, 1'000'000'000'000}, read_key_file("", key_file_));
-  }
-  [[nodiscard]] int port() const { return server_.port(); }
-
- private:
-  const TemporaryFolder folder_;
-  const std::filesystem::path key_file_ =
-      folder_.write("key", "0123456789abcdef0123456789abcdef\n");
-  const RunningServer server_{
-      [this](ServerConfig& config) { config.token_key_file = key_file_.string(); }};
-};
-
-template <typename AnyServer>
-std::optional<v1::Error> refusal(const AnyServer& server, const v1::ClientMessage& hello) {
-  WireClient client(server.port());
-  client.send(hello);
-  std::optional<v1::Error> error;
-  client.receive_until_closed(&error);
-  return error;
+/// A server that visitors enter by links. Each case has a scene of its own.
+const RunningServer& server_of_links() {
+  static const RunningServer server([](ServerConfig& config) {
+    config.scenes = {"synth:city:2000", "synth:garden:2000", "synth:stress:2000"};
+    config.token_key_file = link_key_file();
+    config.min_fps = 0;
+  });
+  return server;
 }
 
 void present_no_more(WireClient& host) {
@@ -141,7 +118,7 @@ TEST(Spectators, SeeWhatTheHostSeesInOneEncoding) {
 }
 
 TEST(Spectators, HearOfNewSettingsAndMayLeave) {
-  RunningServer server;
+  const RunningServer& server = shared_server();
   WireClient host(server.port());
   const std::string link = host.greet(160, 96).watch_token();
   host.present();
@@ -154,9 +131,7 @@ TEST(Spectators, HearOfNewSettingsAndMayLeave) {
   settings.mutable_settings()->set_height_px(180);
   host.send(settings);
   EXPECT_EQ(spectator.receive_message(v1::ServerMessage::kConfig).config().width_px(), 320u);
-  v1::ClientMessage bye;
-  bye.mutable_bye();
-  spectator.send(bye);
+  spectator.send(bye_message());
   EXPECT_EQ(spectator.receive_until_closed().close_code, 1000);
   ReceivedFrame frame;
   do {  // what sharpened the smaller picture may still come
@@ -170,26 +145,29 @@ TEST(Spectators, AreLimitedAndNeedARealLink) {
   RunningServer server([](ServerConfig& config) { config.max_spectators = 1; });
   WireClient host(server.port());
   const v1::Welcome welcome = host.greet();
-  EXPECT_EQ(refusal(server, watching_hello(welcome.watch_token()))->code(),
+  EXPECT_EQ(refusal(server.port(), watching_hello(welcome.watch_token())).code(),
             v1::Error::SESSION_ENDED)
       << "nobody looks on unasked";
   host.present();
-  EXPECT_EQ(refusal(server, watching_hello("made.up"))->code(), v1::Error::UNAUTHORIZED);
-  EXPECT_EQ(refusal(server, watching_hello(welcome.session_id()))->code(), v1::Error::UNAUTHORIZED);
-  EXPECT_EQ(refusal(server, watching_hello(welcome.resume_token()))->code(),
+  EXPECT_EQ(refusal(server.port(), watching_hello("made.up")).code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server.port(), watching_hello(welcome.session_id())).code(),
+            v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server.port(), watching_hello(welcome.resume_token())).code(),
             v1::Error::UNAUTHORIZED);
   WireClient first(server.port());
   first.greet(watching_hello(welcome.watch_token()));
-  EXPECT_EQ(refusal(server, watching_hello(welcome.watch_token()))->code(), v1::Error::SERVER_FULL);
+  EXPECT_EQ(refusal(server.port(), watching_hello(welcome.watch_token())).code(),
+            v1::Error::SERVER_FULL);
   v1::ClientMessage jpeg_only = watching_hello(welcome.watch_token());
   jpeg_only.mutable_hello()->set_decoders(0, v1::CODEC_MJPEG);
-  EXPECT_EQ(refusal(server, jpeg_only)->code(), v1::Error::NO_COMMON_CODEC);
+  EXPECT_EQ(refusal(server.port(), jpeg_only).code(), v1::Error::NO_COMMON_CODEC);
 }
 
 TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
-  const ServerOfLinks server;
+  const RunningServer& server = server_of_links();
+  const auto link = [](const char* role) { return make_link(role, "city"); };
   WireClient host(server.port());
-  const std::string watch = host.greet(64, 64, v1::CODEC_H264, server.link("viewer")).watch_token();
+  const std::string watch = host.greet(hello_by(link("viewer"))).watch_token();
   host.present();
   WireClient guest(server.port());
   v1::ClientMessage by_link = watching_hello(watch);
@@ -197,39 +175,40 @@ TEST(Spectators, AreRefusedWhereTheTokenForbidsIt) {
   const v1::Welcome shown = guest.greet(by_link);
   EXPECT_TRUE(shown.watching()) << "the leader's link lets a guest watch";
   EXPECT_FALSE(shown.may_leave()) << "and no more";
-  EXPECT_EQ(refusal(server, watching_hello(watch, server.link("solo")))->code(),
+  EXPECT_EQ(refusal(server.port(), watching_hello(watch, link("solo"))).code(),
             v1::Error::UNAUTHORIZED);
   WireClient spectator(server.port());
-  EXPECT_TRUE(spectator.greet(watching_hello(watch, server.link("spectator"))).watching());
+  EXPECT_TRUE(spectator.greet(watching_hello(watch, link("spectator"))).watching());
   WireClient alone(server.port());
-  EXPECT_EQ(alone.greet(64, 64, v1::CODEC_H264, server.link("solo")).watch_token(), "");
+  EXPECT_EQ(alone.greet(hello_by(link("solo"))).watch_token(), "");
 }
 
 TEST(Spectators, NobodyWatchesWhoComesBackByALinkThatForbidsIt) {
-  const ServerOfLinks server;
+  const RunningServer& server = server_of_links();
+  const auto link = [](const char* role) { return make_link(role, "garden"); };
   WireClient host(server.port());
-  const v1::Welcome welcome = host.greet(64, 64, v1::CODEC_H264, server.link("viewer"));
+  const v1::Welcome welcome = host.greet(hello_by(link("viewer")));
   host.present();
-  const v1::ClientMessage watching =
-      watching_hello(welcome.watch_token(), server.link("spectator"));
+  const v1::ClientMessage watching = watching_hello(welcome.watch_token(), link("spectator"));
   WireClient spectator(server.port());
   spectator.greet(watching);
   WireClient alone(server.port());
   v1::ClientMessage back = resuming_hello(welcome.resume_token());
-  back.mutable_hello()->set_token(server.link("solo"));
+  back.mutable_hello()->set_token(link("solo"));
   const v1::Welcome now = alone.greet(back);
   EXPECT_EQ(now.session_id(), welcome.session_id());
   EXPECT_EQ(now.watch_token(), "");
   EXPECT_EQ(spectator.receive_until_closed().close_code, 1000);
-  EXPECT_EQ(refusal(server, watching)->code(), v1::Error::UNAUTHORIZED);
+  EXPECT_EQ(refusal(server.port(), watching).code(), v1::Error::UNAUTHORIZED);
 }
 
-TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
-  const ServerOfLinks server;
+TEST(Spectators, FindTheLeaderOfTheirScene) {
+  const RunningServer& server = server_of_links();
+  const auto link = [](const char* role) { return make_link(role, "stress"); };
   WireClient host(server.port());
-  const std::string id = host.greet(64, 64, v1::CODEC_H264, server.link("viewer")).session_id();
-  const v1::ClientMessage hello = watching_hello("", server.link("spectator"));
-  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
+  const std::string id = host.greet(hello_by(link("viewer"))).session_id();
+  const v1::ClientMessage hello = watching_hello("", link("spectator"));
+  EXPECT_EQ(refusal(server.port(), hello).code(), v1::Error::NO_LEADER);
   host.present();
   WireClient spectator(server.port());
   const v1::Welcome welcome = spectator.greet(hello);
@@ -243,7 +222,7 @@ TEST(Spectators, OfTheirRoleFindWhoLeadsThroughTheirScene) {
   std::optional<v1::Error> error;
   EXPECT_EQ(spectator.receive_until_closed(&error).close_code, 1000);
   EXPECT_EQ(error->code(), v1::Error::SESSION_ENDED);
-  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::NO_LEADER);
+  EXPECT_EQ(refusal(server.port(), hello).code(), v1::Error::NO_LEADER);
 }
 
 TEST(Followers, GetTheLeadersCameraAndKeepTheirOwnStream) {
@@ -298,7 +277,7 @@ TEST(Followers, WatchWhereNoPlaceIsFreeAndHearThatTheLeaderIsAway) {
   const v1::Welcome welcome = follower.greet(hello);
   EXPECT_TRUE(welcome.watching());
   EXPECT_TRUE(welcome.may_leave()) << "once a place is free";
-  EXPECT_EQ(refusal(server, hello)->code(), v1::Error::SERVER_FULL);
+  EXPECT_EQ(refusal(server.port(), hello).code(), v1::Error::SERVER_FULL);
   host.reset();
   lead_of(follower, [](const v1::Lead& now) { return now.state() == v1::Lead::AWAY; });
   WireClient back(server.port());

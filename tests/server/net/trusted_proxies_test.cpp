@@ -1,8 +1,6 @@
 #include "server/net/trusted_proxies.h"
 
-#include <stdexcept>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
@@ -16,7 +14,7 @@ TEST(TrustedProxies, NobodyIsBelievedUnlessNamed) {
   EXPECT_EQ(proxies.client_address("10.1.2.3", "198.51.100.7"), "198.51.100.7");
 }
 
-TEST(TrustedProxies, WhatTheClientMadeUpIsIgnored) {
+TEST(TrustedProxies, AddressesMadeUpByTheClientAreIgnored) {
   const TrustedProxies proxies({"10.0.0.0/8", "192.0.2.99"});
   EXPECT_EQ(proxies.client_address("10.0.0.1", "1.1.1.1, 198.51.100.7"), "198.51.100.7");
   EXPECT_EQ(proxies.client_address("10.0.0.1", "1.1.1.1, 198.51.100.7 ,192.0.2.99, 10.0.0.2"),

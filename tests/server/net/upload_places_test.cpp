@@ -1,9 +1,6 @@
 #include "server/net/upload_places.h"
 
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
@@ -52,7 +49,7 @@ TEST(UploadPlaces, OneAddressLeavesSomeToOthers) {
   }
 }
 
-TEST(UploadPlaces, ForLargeBodiesAreFewer) {
+TEST(UploadPlaces, LargeBodiesHaveFewer) {
   UploadPlaces places(UploadPlaces::large);
   const auto first = places.take("greedy", "here");
   EXPECT_TRUE(first);

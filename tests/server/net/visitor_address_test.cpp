@@ -1,17 +1,12 @@
 #include "server/net/visitor_address.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "server/net/http.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 #include "tests/support/tls.h"
 
 namespace catgs::test {
 namespace {
-
-using testing::Each;
-using testing::Truly;
 
 const std::vector<std::string> machine = {"192.0.2.7", "2001:db8::7"};
 

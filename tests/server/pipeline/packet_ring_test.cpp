@@ -1,15 +1,10 @@
 #include "server/pipeline/packet_ring.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "server/pipeline/latest_slot.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using testing::ElementsAre;
-using testing::IsEmpty;
 
 OutgoingFrame frame(std::uint64_t id, bool idr, std::size_t bytes = 10) {
   OutgoingFrame out;
@@ -127,10 +122,10 @@ TEST(PacketRing, NothingIsReplacedThatAFrameStandsBehind) {
   EXPECT_THAT(all_popped(ring), ElementsAre(1, 101, 3, 102));
 }
 
-TEST(PacketRing, ForASocketIsBoundedInFramesBytesAndMessages) {
+TEST(PacketRing, IsBoundedInFramesBytesAndMessages) {
   PacketRing ring;
   for (std::uint64_t id = 1; id <= 8; ++id) EXPECT_THAT(ring.push(frame(id, id == 1)), IsEmpty());
-  EXPECT_THAT(ring.push(frame(9, false)), testing::SizeIs(9));
+  EXPECT_THAT(ring.push(frame(9, false)), SizeIs(9));
   for (int i = 0; i < 64; ++i) EXPECT_TRUE(ring.push(message(i)));
   EXPECT_FALSE(ring.push(message(64)));
   PacketRing long_messages;

@@ -1,22 +1,15 @@
 #include "server/scenes/derived_files.h"
 
-#include <chrono>
-
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 
 class DerivedFilesTest : public FolderTest {
  protected:

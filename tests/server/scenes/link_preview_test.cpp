@@ -1,14 +1,9 @@
 #include "server/scenes/link_preview.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
 
 TEST(LinkPreview, NamesTitleAndPoster) {
   const std::string head = preview_elements({"https://tours.example:8443",

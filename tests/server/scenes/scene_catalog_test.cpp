@@ -8,16 +8,12 @@
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
 #include "tests/render_core/scene/tree/tree_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
 using ::testing::_;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::Throws;
-using ::testing::ThrowsMessage;
 using ::testing::WhenDynamicCastTo;
 
 /// A streamed SOG folder with levels of 200 and 50 Gaussians, and a splat file without levels.

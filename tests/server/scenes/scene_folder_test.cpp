@@ -1,21 +1,13 @@
 #include "server/scenes/scene_folder.h"
 
-#include <chrono>
-
-#include <nlohmann/json.hpp>
-
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::ThrowsMessage;
 
 class SceneFolderTest : public FolderTest {
  protected:

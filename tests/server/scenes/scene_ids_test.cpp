@@ -1,9 +1,8 @@
 #include "server/scenes/scene_ids.h"
 
-#include <gtest/gtest.h>
-
 #include "server/base/scene_id.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {

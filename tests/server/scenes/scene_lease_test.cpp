@@ -2,15 +2,11 @@
 
 #include "server/scenes/scene_lease.h"
 
-#include <filesystem>
-#include <future>
-
 #include "tests/server/scenes/scene_library_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 class SceneLeaseTest : public SceneLibraryTime {
  protected:
@@ -73,14 +69,7 @@ TEST_F(SceneLeaseTest, BackgroundJobGetsItsSceneAgain) {
 TEST_F(SceneLeaseTest, LoadForABackgroundJobGivesWay) {
   let_a_leave();
   std::promise<void> mount;
-  {
-    // The loader frees this one, and stays in it.
-    const auto free = [&mount](const SceneEntry* entry) {
-      mount.get_future().wait();
-      delete entry;
-    };
-    library_->revise(id("b"), Entry(new SceneEntry(*library_->in_memory(id("b"))), free));
-  }
+  hang_when_released("b", mount);
   EXPECT_FALSE(lease("a", true).lease);
   EXPECT_FALSE(in_memory("b")) << "it leaves for the job";
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(awaited("b")) << "a visitor asks again";
@@ -97,24 +86,14 @@ TEST_F(SceneLeaseTest, LoadForABackgroundJobGivesWay) {
 TEST_F(SceneLeaseTest, PosterGivesWayAndIsMadeLater) {
   load("b");
   std::promise<void> mount;
-  {
-    const auto free = [&mount](const SceneEntry* entry) {
-      mount.get_future().wait();
-      delete entry;
-    };
-    library_->revise(id("b"), Entry(new SceneEntry(*library_->in_memory(id("b"))), free));
-  }
+  hang_when_released("b", mount);
   std::filesystem::remove(folder_ / "b.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   tick(1s);  // the loader is busy from now on
-  const auto has_poster = [&] {
-    const auto listing = library_->listing();
-    return std::ranges::find(*listing, id("a"), &SceneLibrary::Listing::id)->poster != nullptr;
-  };
+  const auto has_poster = [&] { return listed("a").poster != nullptr; };
   library_->want_poster(id("a"));
-  io_.restart();
-  io_.poll();
+  io_->restart();
+  io_->poll();
   EXPECT_TRUE(awaited("c"));
   mount.set_value();
   run_until([&] { return in_memory("c"); });
@@ -129,9 +108,7 @@ TEST_F(SceneLeaseTest, BackgroundJobHearsThatTheFileHasChanged) {
   load("a");
   LeasedScene film = lease("a");
   const int before = film.lease->content();
-  const auto time = std::filesystem::last_write_time(folder_ / "a.ply");
-  save_scene(random_cloud(100, 0), folder_ / "a.ply");
-  std::filesystem::last_write_time(folder_ / "a.ply", time + 2s);
+  replace("a.ply", 100);
   tick(31s);
   run_until([&] { return library_->listing()->at(1).gaussians == 100; });
   tick(1s);
@@ -156,7 +133,7 @@ TEST_F(SceneLeaseTest, SavedSceneKeepsNoLease) {
     revised->facts.title = "Saved";
     library_->revise(id("a"), std::move(revised));
   }
-  EXPECT_EQ(library_->in_memory(id("a"))->facts.title, "Saved");
+  EXPECT_EQ(entry("a")->facts.title, "Saved");
   tick(60s);
   library_->want(id("b"), now_);
   EXPECT_TRUE(awaited("c"));

@@ -1,24 +1,12 @@
-#include <filesystem>
-#include <future>
-#include <sstream>
-
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
-
 #include "tests/server/scenes/scene_library_fixture.h"
+#include "tests/support/captured_log.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
-
 TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
-  const auto tours_of_a = [&] {
-    const auto listing = library_->listing();
-    return std::ranges::find(*listing, id("a"), &SceneLibrary::Listing::id)->tours;
-  };
+  const auto tours_of_a = [&] { return listed("a").tours; };
   EXPECT_FALSE(tours_of_a());
   const Entry a = load("a");
   EXPECT_EQ(tours_of_a()->for_viewers, a->tours.for_viewers) << "the same, not one like it";
@@ -27,25 +15,20 @@ TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
 }
 
 TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
-  const auto shown = [&](const std::string& name) {
-    const auto listing = library_->listing();
-    return *std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id);
-  };
   library_->want_poster(id("a"));
-  run_until([&] { return shown("a").poster != nullptr; });
-  EXPECT_FALSE(shown("a").loaded) << "it was there for a moment";
+  run_until([&] { return listed("a").poster != nullptr; });
+  EXPECT_FALSE(listed("a").loaded) << "it was there for a moment";
   load("b");
-  EXPECT_NE(shown("b").poster, nullptr);
+  EXPECT_NE(listed("b").poster, nullptr);
   tick(60s);
   load("a");
   tick(60s);
   load("c");
-  EXPECT_FALSE(shown("b").loaded);
-  EXPECT_NE(shown("b").poster, nullptr);
-  const auto before = std::filesystem::last_write_time(folder_ / "b.ply");
-  std::filesystem::last_write_time(folder_ / "b.ply", before + 2s);
+  EXPECT_FALSE(listed("b").loaded);
+  EXPECT_NE(listed("b").poster, nullptr);
+  touch("b.ply");
   tick(31s);
-  run_until([&] { return shown("b").poster == nullptr; });
+  run_until([&] { return listed("b").poster == nullptr; });
 }
 
 TEST_F(SceneLibraryTime, APreparedSceneIsThereWhenItsVisitorComes) {
@@ -86,10 +69,7 @@ TEST_F(SceneLibraryTime, PreparingMakesNoRoom) {
 }
 
 TEST_F(SceneLibraryTime, NobodyWaitsForAPoster) {
-  const auto has_poster = [&](const std::string& name) {
-    const auto listing = library_->listing();
-    return std::ranges::find(*listing, id(name), &SceneLibrary::Listing::id)->poster != nullptr;
-  };
+  const auto has_poster = [&](const char* name) { return listed(name).poster != nullptr; };
   EXPECT_TRUE(awaited("a"));
   library_->want_poster(id("b"));  // while a visitor waits
   run_until([&] { return in_memory("a"); });
@@ -108,39 +88,12 @@ TEST_F(SceneLibraryTime, TellsOfScenesBeforeTheyAreLoaded) {
   folder_.write("d.json", R"({"title": "The hall", "licence": "MIT"})");
   save_scene(random_cloud(10, 0), folder_ / "d.ply");
   start();
-  const auto listing = library_->listing();
-  const auto d = std::ranges::find(*listing, id("d"), &SceneLibrary::Listing::id);
-  EXPECT_EQ(d->title, "The hall");
-  EXPECT_EQ(d->about.licence, "MIT");
-  EXPECT_FALSE(d->loaded);
+  EXPECT_EQ(listed("d").title, "The hall");
+  EXPECT_EQ(listed("d").about.licence, "MIT");
+  EXPECT_FALSE(listed("d").loaded);
 }
 
-TEST_F(SceneLibraryTime, OneIsLoadedAnotherWaitsAndTheThirdIsRefused) {
-  EXPECT_TRUE(awaited("a"));
-  EXPECT_TRUE(awaited("b"));
-  const ErrorMessage refused = refusal("c");
-  EXPECT_EQ(refused.code, ErrorCode::server_full);
-  EXPECT_THAT(refused.message, HasSubstr("other scenes are being loaded"));
-  EXPECT_TRUE(awaited("a")) << "who wants the same waits with the first";
-  run_until([&] { return in_memory("a") && in_memory("b"); });
-  EXPECT_TRUE(awaited("c"));
-}
-
-TEST_F(SceneLibraryTime, AfterTenSecondsTheLeastRecentlyUsedGoes) {
-  load("a");
-  load("b");
-  EXPECT_TRUE(awaited("c"));
-  tick(6s);
-  library_->want(id("a"), now_);
-  tick(3s);
-  EXPECT_TRUE(in_memory("a") && in_memory("b")) << "ten seconds at least";
-  tick(2s);
-  EXPECT_TRUE(in_memory("a"));
-  EXPECT_FALSE(in_memory("b"));
-  run_until([&] { return in_memory("c"); });
-}
-
-TEST_F(SceneLibraryTime, WhatSomebodyLooksAtNeverGoes) {
+TEST_F(SceneLibraryTime, ASceneInUseIsNeverReleased) {
   Entry seen = load("a");
   const Entry also_seen = load("b");
   tick(3600s);
@@ -158,13 +111,11 @@ TEST_F(SceneLibraryTime, WhatSomebodyLooksAtNeverGoes) {
 
 TEST_F(SceneLibraryTime, AReplacedFileIsLoadedAnewWhenNobodyLooksAtTheOldOne) {
   Entry old = load("a");
-  const auto before = std::filesystem::last_write_time(folder_ / "a.ply");
-  save_scene(random_cloud(100, 0), folder_ / "a.ply");
-  std::filesystem::last_write_time(folder_ / "a.ply", before + 2s);
+  replace("a.ply", 100);
   tick(31s);
   run_until([&] { return library_->listing()->at(1).gaussians == 100; });
   tick(1s);
-  EXPECT_EQ(library_->in_memory(id("a")), old);
+  EXPECT_EQ(entry("a"), old);
   old.reset();
   tick(1s);
   EXPECT_FALSE(in_memory("a"));
@@ -174,14 +125,8 @@ TEST_F(SceneLibraryTime, AReplacedFileIsLoadedAnewWhenNobodyLooksAtTheOldOne) {
 TEST_F(SceneLibraryTime, AMountThatHangsHoldsUpNobodyElse) {
   std::promise<void> mount;
   load("b");
-  {
-    // The loader frees this one, and stays in it.
-    const auto free = [&mount](const SceneEntry* entry) {
-      mount.get_future().wait();
-      delete entry;
-    };
-    library_->revise(id("a"), Entry(new SceneEntry(*load("a")), free));
-  }
+  load("a");
+  hang_when_released("a", mount);
   tick(3600s);
   library_->want(id("b"), now_);
   EXPECT_TRUE(awaited("c"));
@@ -212,21 +157,18 @@ TEST_F(SceneLibraryTime, FilesThatComeAndGoAreNoticed) {
 TEST_F(SceneLibraryTime, AFileThatComesBackWhileItIsLookedAtIsTheSceneThatItWas) {
   Entry seen = load("a");
   std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   EXPECT_THAT(names(), ElementsAre("city", "b", "c"));
   tick(1s);
-  EXPECT_EQ(library_->in_memory(id("a")), seen) << "who looks at it goes on";
+  EXPECT_EQ(entry("a"), seen) << "who looks at it goes on";
   std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 4; });
+  rescan(4);
   EXPECT_THAT(names(), ElementsAre("city", "a", "b", "c"));
   seen.reset();
   tick(1s);
   EXPECT_TRUE(in_memory("a")) << "the same file: nothing is outdated";
   std::filesystem::remove(folder_ / "a.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   tick(1s);
   EXPECT_FALSE(has("a"));
 }
@@ -234,17 +176,15 @@ TEST_F(SceneLibraryTime, AFileThatComesBackWhileItIsLookedAtIsTheSceneThatItWas)
 TEST_F(SceneLibraryTime, NewcomersAreNotGivenASceneWhoseFileIsGone) {
   config_.scenes.clear();
   start();
-  const Entry seen = library_->in_memory(id("a"));
+  const Entry seen = entry("a");
   EXPECT_EQ(name_in(library_->default_scene()), "a");
   std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 2; });
+  rescan(2);
   EXPECT_TRUE(has("a")) << "somebody looks at it";
   EXPECT_EQ(name_in(library_->default_scene()), "b");
   EXPECT_THAT(names(), ElementsAre("b", "c"));
   std::filesystem::rename(folder_ / "hidden", folder_ / "a.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   EXPECT_EQ(name_in(library_->default_scene()), "a");
 }
 
@@ -255,20 +195,15 @@ TEST_F(SceneLibraryTime, TheLogTellsWhichFileAnIdOfASharedNameBelongsTo) {
   // Of the same name as `folder_`, so that ids are made of whole paths.
   const std::filesystem::path twin = annex / folder_.path().filename();
   std::filesystem::create_directory(twin);
-  std::ostringstream log;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-      "library test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  const CapturedLog log;
   config_.scene_folders = {folder_.path().string(), annex.path().string(), twin.string()};
   start();
-  library_.reset();
-  spdlog::set_default_logger(before);
   const SceneIds ids({}, config_.scene_folders);
   for (const auto& file : {folder_ / "a.ply", annex / "a.ply"})
-    EXPECT_THAT(log.str(), HasSubstr("scene " + ids.id_of(file.string(), "a") + " is " +
-                                     file.string() + ", one of several called \"a\""));
-  EXPECT_THAT(log.str(), Not(HasSubstr((folder_ / "b.ply").string() + ", one of several")));
-  EXPECT_THAT(log.str(), HasSubstr(twin.string() + " have the same name"));
+    EXPECT_THAT(log.text(), HasSubstr("scene " + ids.id_of(file.string(), "a") + " is " +
+                                      file.string() + ", one of several called \"a\""));
+  EXPECT_THAT(log.text(), Not(HasSubstr((folder_ / "b.ply").string() + ", one of several")));
+  EXPECT_THAT(log.text(), HasSubstr(twin.string() + " have the same name"));
 }
 
 TEST_F(SceneLibraryTime, NoIdComesToMeanAnotherFile) {
@@ -278,15 +213,13 @@ TEST_F(SceneLibraryTime, NoIdComesToMeanAnotherFile) {
   const std::string first = id("a");
   EXPECT_TRUE(library_->has(first));
   save_scene(random_cloud(10, 0), annex / "a.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 5; });
+  rescan(5);
   const std::string second = SceneIds({}, config_.scene_folders).id_of(annex / "a.ply", "a");
   EXPECT_NE(first, second);
   EXPECT_TRUE(library_->has(first) && library_->has(second));
   EXPECT_FALSE(has("a")) << "which of them?";
   std::filesystem::rename(folder_ / "a.ply", folder_ / "hidden");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 4; });
+  rescan(4);
   EXPECT_FALSE(library_->has(first));
   EXPECT_TRUE(library_->has(second));
   EXPECT_FALSE(has("a")) << "it meant the one that is gone";
@@ -316,8 +249,7 @@ TEST_F(SceneLibraryTime, AFileOfBothSettingsIsOneScene) {
   start();
   EXPECT_THAT(names(), ElementsAre("b", "a", "c"));
   EXPECT_TRUE(in_memory("b"));
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   EXPECT_TRUE(in_memory("b"));
   config_.scenes = {folder_ / "b.ply", folder_ / "b.ply"};
   start();
@@ -340,8 +272,7 @@ TEST_F(SceneLibraryTime, AFileThatGoesBeforeItIsLoadedIsForgotten) {
   EXPECT_TRUE(awaited("a"));
   EXPECT_TRUE(awaited("b"));
   std::filesystem::remove(folder_ / "b.ply");
-  tick(31s);
-  run_until([&] { return library_->listing()->size() == 3; });
+  rescan(3);
   run_until([&] {
     tick(31s);
     return !has("b");

@@ -1,16 +1,10 @@
 #include "server/scenes/scene_residency.h"
 
-#include <set>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
-using testing::ElementsAre;
-using testing::IsEmpty;
 using Answer = SceneResidency::Answer;
 
 class SceneResidencyTest : public testing::Test {
@@ -136,7 +130,7 @@ TEST_F(SceneResidencyTest, ASceneStaysForAMinuteAndTheNextOneWaitsForThat) {
   EXPECT_EQ(step->load, "b");
 }
 
-TEST_F(SceneResidencyTest, WhoWaitsHearsWhenTheRoomIsTakenAgain) {
+TEST_F(SceneResidencyTest, AWaitingVisitorIsRefusedWhenTheRoomIsTakenAgain) {
   visit("a", 60);
   EXPECT_EQ(want("b", 60), Answer::awaited);
   used_ = {"a"};

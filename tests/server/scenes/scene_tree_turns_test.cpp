@@ -2,11 +2,10 @@
 #include <future>
 
 #include "tests/server/scenes/scene_trees_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
   save_scene(random_cloud(100'000, 0), folder_ / "scenes/large.ply");  // 5.6 MB
@@ -16,7 +15,7 @@ TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
   std::promise<void> go;
   Background::Jobs others(background_);
   others.start(lanes::trees, Priority::high, [&](const auto&) { go.get_future().wait(); });
-  load("large");
+  visit("large");
   library_->on_tick(now_);
   EXPECT_THAT(state("large"), HasSubstr("waits")) << "it is shown as a whole meanwhile";
   EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
@@ -34,17 +33,16 @@ TEST_F(SceneTreesTest, SceneInTwoFormsKeepsNobodyOut) {
   config_.scene_memory_mb = 13;
   config_.gaussians_of_a_tree = 20'000;
   start();
-  Entry seen = load("b");
+  Entry seen = visit("b");
   run_until([&] { return library_->newer_representation(*seen) != nullptr; });
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("c"), now_)))
-      << "the form before goes as soon as its visitor has the new one";
+  EXPECT_TRUE(awaited("c")) << "the form before goes as soon as its visitor has the new one";
   seen.reset();
-  EXPECT_FALSE(load("c")->in_pages);
+  EXPECT_FALSE(visit("c")->in_pages);
 }
 
 TEST_F(SceneTreesTest, BackgroundJobGoesOnWithTheTree) {
   start();
-  load("a");
+  visit("a");
   LeasedScene film = library_->lease(id("a"));
   ASSERT_TRUE(film.lease);
   EXPECT_FALSE(film.entry->in_pages);

@@ -8,25 +8,20 @@
 #include "render_core/scene/tree/tree_shape.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/server/scenes/scene_trees_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
-
 TEST_F(SceneTreesTest, ASceneIsServedAtOnceAndThenFromItsTree) {
   start();
-  Entry seen = load("a");
+  Entry seen = visit("a");
   EXPECT_FALSE(seen->in_pages);
   EXPECT_EQ(library_->newer_representation(*seen), nullptr);
   library_->on_tick(now_);
   EXPECT_THAT(state("a"), HasSubstr("tree")) << "it waits or is built";
-  run_until([&] { return in_memory("a") != seen; });
-  const Entry tree = in_memory("a");
+  run_until([&] { return entry("a") != seen; });
+  const Entry tree = entry("a");
   EXPECT_TRUE(tree->in_pages);
   EXPECT_EQ(tree->facts.gaussians, 3000u);
   EXPECT_EQ(tree->facts.start_pose.position, seen->facts.start_pose.position);
@@ -49,7 +44,7 @@ TEST_F(SceneTreesTest, TheNextStartUsesTheTree) {
   const fs::path tree = trees()[0];
   const std::string bytes = bytes_in(tree);
   start();
-  EXPECT_TRUE(load("a")->in_pages);
+  EXPECT_TRUE(visit("a")->in_pages);
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
   EXPECT_EQ(built(), 1);
   EXPECT_THAT(trees(), ElementsAre(tree));
@@ -61,7 +56,7 @@ TEST_F(SceneTreesTest, AScenesOwnNameAndSidecarCountInItsTree) {
   start();
   build("a");
   start();
-  const Entry tree = load("a");
+  const Entry tree = visit("a");
   EXPECT_TRUE(tree->in_pages);
   EXPECT_EQ(tree->name, "a");
   EXPECT_EQ(tree->facts.title, "The hall");
@@ -73,15 +68,13 @@ TEST_F(SceneTreesTest, AChangedSceneGetsAnotherTree) {
   start();
   build("a");
   const fs::path before = trees().at(0);
-  const auto time = fs::last_write_time(folder_ / "scenes/a.ply");
-  save_scene(random_cloud(2000, 0), folder_ / "scenes/a.ply");
-  fs::last_write_time(folder_ / "scenes/a.ply", time + 2s);
+  replace("scenes/a.ply", 2000);
   now_ += 31s;
   run_until([&] { return !fs::exists(before); });
-  run_until([&] { return !in_memory("a"); });
-  EXPECT_EQ(load("a")->facts.gaussians, 2000u);
+  run_until([&] { return !entry("a"); });
+  EXPECT_EQ(visit("a")->facts.gaussians, 2000u);
   build("a");
-  EXPECT_EQ(in_memory("a")->facts.gaussians, 2000u);
+  EXPECT_EQ(entry("a")->facts.gaussians, 2000u);
   EXPECT_THAT(trees(), SizeIs(1));
   EXPECT_EQ(built(), 2);
 }
@@ -101,9 +94,9 @@ TEST_F(SceneTreesTest, ADamagedTreeIsBuiltAgain) {
     library_.reset();
     std::ofstream(tree, std::ios::binary) << broken;
     start();
-    EXPECT_FALSE(load("a")->in_pages) << "it is served as a whole meanwhile";
+    EXPECT_FALSE(visit("a")->in_pages) << "it is served as a whole meanwhile";
   }
-  run_until([&] { return in_memory("a")->in_pages; });
+  run_until([&] { return entry("a")->in_pages; });
   EXPECT_EQ(bytes_in(tree), bytes);
 }
 
@@ -111,7 +104,7 @@ TEST_F(SceneTreesTest, DamageThatIsFoundLaterIsMended) {
   save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");
   config_.scene_memory_mb = 6;  // memory for four pages of nine
   start();
-  const Entry seen = load("b");
+  const Entry seen = visit("b");
   const fs::path tree = trees().at(0);
   const std::string bytes = bytes_in(tree);
   std::fstream file(tree, std::ios::in | std::ios::out | std::ios::binary);
@@ -130,24 +123,12 @@ TEST_F(SceneTreesTest, DamageThatIsFoundLaterIsMended) {
     ASSERT_TRUE(view->render(request, frame).ok());
   }
   ASSERT_GT(seen->renderer->pages().at(0).unreadable, 0u);
-  run_until([&] { return in_memory("b") != seen; });
+  run_until([&] { return entry("b") != seen; });
   EXPECT_EQ(built(), 2);
   EXPECT_EQ(bytes_in(tree), bytes);
-  EXPECT_EQ(library_->newer_representation(*seen), in_memory("b"))
-      << "present visitors go on with it";
+  EXPECT_EQ(library_->newer_representation(*seen), entry("b")) << "present visitors go on with it";
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
   EXPECT_THAT(trees(), ElementsAre(tree)) << "the new one is not that with the damage";
-}
-
-TEST_F(SceneTreesTest, WhatAKilledBuildLeftIsNotUsed) {
-  start();
-  build("a");
-  const fs::path tree = trees().at(0);
-  library_.reset();
-  fs::rename(tree, tree.string() + ".part");
-  start();
-  EXPECT_THAT(trees(), IsEmpty());
-  EXPECT_FALSE(load("a")->in_pages);
 }
 
 /// Opening one would wait for its reader, and a server that ends would wait for the build.
@@ -177,10 +158,10 @@ TEST_F(SceneTreesTest, ASceneThatDoesNotFitWaitsForItsTree) {
   save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");  // 7.1 MB
   config_.scene_memory_mb = 6;
   start();
-  EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id("b"), now_)));
+  EXPECT_TRUE(awaited("b"));
   library_->on_tick(now_);
   EXPECT_THAT(state("b"), HasSubstr("tree")) << "it waits or is built";
-  const Entry tree = load("b");
+  const Entry tree = visit("b");
   EXPECT_TRUE(tree->in_pages);
   EXPECT_EQ(tree->facts.gaussians, 30'000u);
   EXPECT_LE(metrics_.scene_bytes.Value(), 6e6);
@@ -196,8 +177,7 @@ TEST_F(SceneTreesTest, OneTreeIsBuiltAtATime) {
     save_scene(random_cloud(30'000, 3), folder_ / "scenes" / (std::string(name) + ".ply"));
   config_.scene_memory_mb = 6;
   start();
-  for (const char* name : {"b", "c", "d", "c"})
-    EXPECT_TRUE(std::holds_alternative<SceneAwaited>(library_->want(id(name), now_)));
+  for (const char* name : {"b", "c", "d", "c"}) EXPECT_TRUE(awaited(name));
   library_->on_tick(now_);
   run_until([&] {
     const std::vector<std::string> states = {state("b"), state("c"), state("d")};
@@ -214,19 +194,19 @@ TEST_F(SceneTreesTest, OneOfTheSettingsIsReadyWhenTheServerIs) {
   config_.scenes = {folder_ / "hall.ply"};
   config_.scene_memory_mb = 6;
   start();
-  EXPECT_TRUE(in_memory("hall")->in_pages) << "it does not fit: its tree is built first";
+  EXPECT_TRUE(entry("hall")->in_pages) << "it does not fit: its tree is built first";
   EXPECT_EQ(built(), 1);
   start();
-  EXPECT_TRUE(in_memory("hall")->in_pages);
+  EXPECT_TRUE(entry("hall")->in_pages);
   EXPECT_EQ(built(), 1);
   config_.scene_memory_mb = 0;
   library_.reset();
   fs::remove_all(folder_ / "trees");
   start();
-  const Entry whole = in_memory("hall");
+  const Entry whole = entry("hall");
   EXPECT_FALSE(whole->in_pages);
-  run_until([&] { return in_memory("hall")->in_pages; });
-  EXPECT_EQ(library_->newer_representation(*whole), in_memory("hall"));
+  run_until([&] { return entry("hall")->in_pages; });
+  EXPECT_EQ(library_->newer_representation(*whole), entry("hall"));
 }
 
 /// Levels of 30,000 and 1,000 Gaussians, of which the finest one takes 7.1 MB.
@@ -247,7 +227,7 @@ TEST_F(SceneTreesTest, AStreamedSceneThatDoesNotFitBeginsWithACoarserLevel) {
             .dump());
   config_.scene_memory_mb = 6;
   start();
-  const Entry coarse = load("streamed");
+  const Entry coarse = visit("streamed");
   EXPECT_EQ(coarse->facts.gaussians, 1'000u);
   EXPECT_FALSE(coarse->in_pages);
   run_until([&] { return library_->newer_representation(*coarse) != nullptr; });
@@ -260,35 +240,35 @@ TEST_F(SceneTreesTest, TheNextVisitorGetsTheTreeWhereBothFormsDoNotFit) {
   save_scene(random_cloud(30'000, 3), folder_ / "scenes/b.ply");
   config_.scene_memory_mb = 8;
   start();
-  Entry whole = load("b");
+  Entry whole = visit("b");
   EXPECT_FALSE(whole->in_pages);
   run_until([&] { return built() == 1; });
   for (int i = 0; i < 10; ++i) library_->on_tick(now_);
-  EXPECT_EQ(in_memory("b"), whole) << "somebody looks at it";
+  EXPECT_EQ(entry("b"), whole) << "somebody looks at it";
   whole.reset();
-  run_until([&] { return !in_memory("b"); });
-  EXPECT_TRUE(load("b")->in_pages);
+  run_until([&] { return !entry("b"); });
+  EXPECT_TRUE(visit("b")->in_pages);
 }
 
 TEST_F(SceneTreesTest, SmallScenesGetNone) {
   config_.gaussians_of_a_tree = 3001;
   start();
-  load("a");
+  visit("a");
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
   EXPECT_EQ(state("a"), "");
   EXPECT_THAT(trees(), IsEmpty());
 }
 
-TEST_F(SceneTreesTest, WithoutTheSettingNothingIsWritten) {
+TEST_F(SceneTreesTest, NothingIsWrittenUnlessConfigured) {
   config_.cache_dir.clear();
   start();
-  load("a");
+  visit("a");
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1s);
   EXPECT_EQ(state("a"), "");
   std::vector<std::string> names;
   for (const auto& entry : fs::recursive_directory_iterator(folder_.path()))
     names.push_back(entry.path().filename());
-  EXPECT_THAT(names, testing::UnorderedElementsAre("scenes", "a.ply"));
+  EXPECT_THAT(names, UnorderedElementsAre("scenes", "a.ply"));
 }
 
 TEST_F(SceneTreesTest, PosterIsKeptForTheNextStart) {
@@ -301,7 +281,7 @@ TEST_F(SceneTreesTest, PosterIsKeptForTheNextStart) {
       poster = std::ranges::find(*listing, id("a"), &SceneLibrary::Listing::id)->poster;
       return poster != nullptr;
     });
-    EXPECT_EQ(in_memory("a"), nullptr);
+    EXPECT_EQ(entry("a"), nullptr);
     return *poster;
   };
   const std::string made = poster_of_next_start();
@@ -321,21 +301,15 @@ TEST_F(SceneTreesTest, PosterIsKeptForTheNextStart) {
   EXPECT_NE(poster_of_next_start(), other) << "the author shows something else now";
 }
 
-TEST_F(SceneTreesTest, AFolderThatCannotBeUsedIsNamed) {
-  config_.cache_dir = write("file", "");
-  EXPECT_THAT(input_error([&] { start(); }),
-              AllOf(HasSubstr("--cache-dir"), HasSubstr((folder_ / "file").string())));
-}
-
 TEST_F(SceneTreesTest, AFailedBuildIsNotTriedAgainSoon) {
   // In the place of the tree.
   write("trees/" + tree_name(locate_scene(folder_ / "scenes/a.ply"), {}) + "/file", "");
   start();
-  const Entry whole = load("a");
+  const Entry whole = visit("a");
   run_until([&] { return failed() == 1; });
   for (int i = 0; i < 10; ++i) library_->on_tick(now_ += 1min);
   EXPECT_EQ(state("a"), "");
-  EXPECT_EQ(in_memory("a"), whole);
+  EXPECT_EQ(entry("a"), whole);
   EXPECT_EQ(failed(), 1);
   now_ += 30min;
   run_until([&] { return failed() == 2; });
@@ -343,9 +317,8 @@ TEST_F(SceneTreesTest, AFailedBuildIsNotTriedAgainSoon) {
 
 TEST_F(SceneTreesTest, ASceneThatChangesWhileItIsBuiltGetsNoTreeOfIt) {
   start();
-  const auto time = fs::last_write_time(folder_ / "scenes/a.ply");
-  fs::last_write_time(folder_ / "scenes/a.ply", time + 2s);  // as by a copy that goes on
-  load("a");
+  touch("scenes/a.ply");  // as by a copy that goes on
+  visit("a");
   run_until([&] { return failed() == 1; });
   EXPECT_THAT(trees(), IsEmpty());
 }
@@ -353,21 +326,21 @@ TEST_F(SceneTreesTest, ASceneThatChangesWhileItIsBuiltGetsNoTreeOfIt) {
 TEST_F(SceneTreesTest, AnEndingServerLeavesNoHalfTree) {
   save_scene(random_cloud(100'000, 3), folder_ / "scenes/large.ply");
   start();
-  load("large");
+  visit("large");
   library_->on_tick(now_);
   library_.reset();
   for (const fs::path& tree : trees()) EXPECT_EQ(tree.extension(), ".tree");
 }
 
-TEST_F(SceneTreesTest, WhatAnAuthorSavesMeanwhileCounts) {
+TEST_F(SceneTreesTest, ASaveDuringTheBuildIsKept) {
   start();
-  const Entry seen = load("a");
-  run_until([&] { return in_memory("a") != seen; });
+  const Entry seen = visit("a");
+  run_until([&] { return entry("a") != seen; });
   auto saved = std::make_shared<SceneEntry>(*seen);
   saved->facts.title = "Saved";
   library_->revise(id("a"), saved);
-  EXPECT_EQ(in_memory("a")->facts.title, "Saved");
-  EXPECT_TRUE(in_memory("a")->in_pages);
+  EXPECT_EQ(entry("a")->facts.title, "Saved");
+  EXPECT_TRUE(entry("a")->in_pages);
 }
 
 }  // namespace

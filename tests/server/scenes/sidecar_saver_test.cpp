@@ -2,33 +2,18 @@
 
 #include "server/scenes/sidecar_saver.h"
 
-#include <atomic>
-#include <chrono>
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <set>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
-
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/post.hpp>
 #include <fmt/format.h>
 
-#include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/save_scene.h"
 #include "server/base/metrics.h"
 #include "server/base/replace_file.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
-using ::testing::HasSubstr;
 using Saved = std::future<HttpResponse>;
 
 bool is_ready(const Saved& answer) { return answer.wait_for(0s) == std::future_status::ready; }
@@ -89,7 +74,7 @@ class SidecarSaverTest : public FolderTest {
   std::shared_ptr<UploadPlace> place_ = std::make_shared<UploadPlace>();
 };
 
-TEST_F(SidecarSaverTest, WhoHasGoneBeforeTheirTurnSavesNothing) {
+TEST_F(SidecarSaverTest, AnAbandonedUploadIsNotSaved) {
   const auto place = std::make_shared<UploadPlace>();
   const std::weak_ptr<const UploadPlace> held = place;
   Saved gone = saver_->save(hall_, sidecar_at(1), {}, place);
@@ -111,7 +96,7 @@ TEST_F(SidecarSaverTest, ARefusalChangesNothingAndRendersNothing) {
   EXPECT_EQ(library_->in_memory(hall_), scene_);
 }
 
-TEST_F(SidecarSaverTest, WhatSomebodyBrokeOnTheDiskIsNotReplacedUnseen) {
+TEST_F(SidecarSaverTest, ABrokenFileIsNotReplacedUnseen) {
   folder_.write("hall.json", "{broken");
   Saved stale = save(sidecar_at(1), "\"another\"");
   run_until([&] { return is_ready(stale); });
@@ -141,7 +126,7 @@ TEST_F(SidecarSaverTest, ToursAloneNeedNoPoster) {
   EXPECT_EQ(posters_.size(), 1u);
 }
 
-TEST_F(SidecarSaverTest, WhatTheAuthorSaysIsShownAtOnce) {
+TEST_F(SidecarSaverTest, SavedTextsAreShownAtOnce) {
   Saved said = save(R"({"title": "The hall", "credits": "Ada", "background": "#ffffff"})");
   run_until([&] { return library_->in_memory(hall_)->poster != scene_->poster; });
   EXPECT_EQ(said.get().status, 200);
@@ -154,7 +139,7 @@ TEST_F(SidecarSaverTest, WhatTheAuthorSaysIsShownAtOnce) {
   EXPECT_EQ(shown().title, "hall") << "its name again";
 }
 
-TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
+TEST_F(SidecarSaverTest, StoppingFinishesTheBegunSaveAndAnswersTheOthers) {
   Saved begun = save(sidecar_at(1));
   Saved waits = save(sidecar_at(2));
   while (io_.poll_one() == 0) {  // until the first save has its scene
@@ -175,83 +160,6 @@ TEST_F(SidecarSaverTest, ThatStopsAnswersWhatWaitsAndFinishesWhatItHasBegun) {
   EXPECT_EQ(io_.poll(), 0u) << "nothing goes on, no poster either";
 }
 
-/// A server's saver with a session thread of its own.
-class Saver {
- public:
-  Saver(const ServerConfig& config, std::string name) : name_(std::move(name)) {
-    library_.emplace(config, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(1)},
-                     background_, io_, metrics_);
-    saver_.emplace(*library_, background_, io_);
-    thread_ = std::thread([this] { io_.run(); });
-  }
-  ~Saver() {
-    boost::asio::post(io_, [this] { saver_->stop(); });
-    idle_.reset();
-    thread_.join();
-    saver_.reset();
-  }
-  Saver(const Saver&) = delete;
-  Saver& operator=(const Saver&) = delete;
-
-  Saved save(const std::string& json, const std::string& if_match) {
-    const Precondition precondition{if_match, if_match.empty() ? "*" : ""};
-    return saver_->save(library_->resolve("hall"), json, precondition, place_);
-  }
-  [[nodiscard]] std::string said(int round) const {
-    return fmt::format(R"({{"title": "{} {}", "credits": "{}"}})", name_, round,
-                       std::string(name_ == "one" ? 700 : 10, 'x'));
-  }
-
- private:
-  const std::string name_;
-  Metrics metrics_;
-  Background background_;
-  boost::asio::io_context io_;
-  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> idle_{
-      io_.get_executor()};
-  std::optional<SceneLibrary> library_;
-  std::optional<SidecarSaver> saver_;
-  std::shared_ptr<UploadPlace> place_ = std::make_shared<UploadPlace>();
-  std::thread thread_;
-};
-
-TEST_F(SidecarSaverTest, OneOfTwoServersOverAFolderSavesAndTheOtherIsTold) {
-  ServerConfig config;
-  config.scenes = {(folder_ / "hall.ply").string()};
-  Saver one(config, "one"), other(config, "other");
-  std::atomic<bool> ended{false};
-  std::atomic<int> cut{0}, reads{0};
-  std::thread reader([&] {
-    for (; !ended; ++reads) {
-      try {
-        const std::string text = on_disk();
-        cut += text.empty() || text.ends_with("\"}") ? 0 : 1;
-      } catch (const InputError&) {
-        ++cut;
-      }
-    }
-  });
-  std::string tag;
-  constexpr int rounds = 60;
-  for (int round = 0; round < rounds; ++round) {
-    Saved first = one.save(one.said(round), tag), second = other.save(other.said(round), tag);
-    const HttpResponse a = first.get(), b = second.get();
-    const bool one_saved = a.status == 200;
-    EXPECT_EQ(one_saved ? b.status : a.status, 412) << round;
-    EXPECT_EQ(one_saved ? a.status : b.status, 200) << round;
-    EXPECT_EQ(on_disk(), one_saved ? one.said(round) : other.said(round)) << round;
-    tag = etag_of(on_disk());
-    EXPECT_EQ(a.etag, tag) << "who was refused is told what is in force";
-    EXPECT_EQ(b.etag, tag);
-  }
-  ended = true;
-  reader.join();
-  EXPECT_GT(reads, 0);
-  EXPECT_EQ(cut, 0);
-  for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
-    EXPECT_FALSE(is_name_of_new_file(entry.path())) << entry.path();
-}
-
 TEST_F(SidecarSaverTest, ASaveWaitsForNoServerThatHoldsTheFolder) {
   const FileLock held = lock_for_saving(folder_.path());
   Saved busy = save(sidecar_at(1));
@@ -262,7 +170,7 @@ TEST_F(SidecarSaverTest, ASaveWaitsForNoServerThatHoldsTheFolder) {
   EXPECT_EQ(on_disk(), "");
 }
 
-TEST_F(SidecarSaverTest, WhatKilledServersHaveLeftIsRemoved) {
+TEST_F(SidecarSaverTest, FilesThatKilledServersLeftAreRemoved) {
   const auto left = [&](const std::string& name) {
     const auto file = folder_.write(name, "half");
     std::filesystem::last_write_time(

@@ -2,21 +2,16 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
 
-#include "render_core/base/error.h"
 #include "render_core/scene/files/save_scene.h"
 #include "server/net/http.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/captured_log.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 class Tours : public FolderTest {
  protected:
@@ -44,7 +39,7 @@ TEST_F(Tours, ComeFromTheSidecarAndTheViewersSettings) {
   EXPECT_EQ(read()["settings"]["animTracks"].size(), 1u) << "the scene's own come first";
 }
 
-TEST_F(Tours, OfATextAreThoseOfThatTextWhateverIsOnTheDisk) {
+TEST_F(Tours, ComeFromTheGivenTextAndNotFromTheDisk) {
   write("museum.json", R"({"tours": [{"title": "Hall"}]})");
   const std::string newer(R"({"tours": [{"title": "Tower"}]})");
   const auto document = nlohmann::json::parse(tours_of(folder_ / "museum.json", newer));
@@ -70,7 +65,7 @@ TEST_F(Tours, RefuseWhatIsNestedWithoutEnd) {
   write("museum.settings.json", R"({"animTracks": 1, "a": )" + deep + "}");
   EXPECT_TRUE(read()["settings"].is_null());
   write("museum.json", R"({"tours": )" + deep + "}");
-  EXPECT_THAT([&] { tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")); },
+  EXPECT_THAT([&] { read(); },
               ThrowsMessage<std::runtime_error>(HasSubstr("nested deeper than 256")));
 }
 
@@ -92,29 +87,23 @@ TEST_F(Tours, AreRefusedBeyondFourMebibytes) {
 
 TEST_F(Tours, SayWhatIsWrongInASidecar) {
   write("museum.json", R"({"tours": {"title": "Hall"}})");
-  EXPECT_THAT([&] { tours_of(folder_ / "museum.json", sidecar_text(folder_ / "museum.json")); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("tours: is not an array")));
+  EXPECT_EQ(refused_field([&] { read(); }), "tours");
 }
 
-TEST_F(Tours, WithAMistakeAreServedAndLogged) {
-  std::ostringstream log;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-      "tours test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+TEST_F(Tours, AreServedAndLoggedDespiteAMistake) {
+  const CapturedLog log;
   const auto show = [&](const std::string& stop) {
-    log.str("");
     write("museum.json", fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", stop));
     return read()["tours"][0]["stops"].size();
   };
   EXPECT_EQ(show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1]})"), 1u);
-  EXPECT_EQ(log.str(), "");
+  EXPECT_EQ(log.text(), "");
   EXPECT_EQ(show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1], "titel": "Door"})"), 1u);
-  EXPECT_THAT(log.str(), AllOf(HasSubstr("museum.json: tours[0].stops[0]: unknown field 'titel'"),
-                               HasSubstr("known are title")));
+  EXPECT_THAT(log.text(), AllOf(HasSubstr("museum.json: tours[0].stops[0]: unknown field 'titel'"),
+                                HasSubstr("known are title")));
   show(R"({"position": [0, 0, 0], "look_at": [0, 0, 1],
            "media": [{"src": "https://media.example/a.mp4"}]})");
-  EXPECT_THAT(log.str(), HasSubstr("--media-origin"));
-  spdlog::set_default_logger(before);
+  EXPECT_THAT(log.text(), HasSubstr("--media-origin"));
 }
 
 constexpr std::string_view stop = R"({"position": [0, 1, 2], "look_at": [0, 1, 3])";
@@ -123,7 +112,7 @@ std::string with_stop(const std::string& more) {
   return fmt::format(R"({{"tours": [{{"title": "Hall", "stops": [{}{}}}]}}]}})", stop, more);
 }
 
-TEST(SentSidecar, OfAWholeTourIsTaken) {
+TEST(SentSidecar, AWholeTourIsTaken) {
   const Sidecar sidecar = check_sent_sidecar(
       R"({"up": "-y", "near": 0.1, "tours": [{"title": "Hall", "autoplay": true, "stops": [
           {"title": "Door", "caption": "Oak.", "position": [1, 2, 3], "orientation": [0, 0, 0, 1],
@@ -142,179 +131,159 @@ TEST(SentSidecar, PortalsLeadToAViewAStopOrTheStartOfAScene) {
         << portal;
 }
 
+/// The field of the sidecar that is refused; empty if it is taken.
 std::string mistake(const std::string& json) {
-  try {
-    check_sent_sidecar(json);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return refused_field([&] { check_sent_sidecar(json, {"https://media.example"}); });
 }
 
-TEST(SentSidecar, OfAPortalIsRefusedByTheFieldThatIsWrong) {
-  const auto of = [](std::string_view portal) {
-    return mistake(with_stop(fmt::format(R"(, "portal": {})", portal)));
-  };
-  EXPECT_THAT(of("7"), HasSubstr("portal: is not an object"));
-  EXPECT_THAT(of("{}"), HasSubstr("'scene' is missing"));
-  EXPECT_THAT(of(R"({"scene": ""})"), HasSubstr("portal.scene: is not 1 to 128 bytes"));
-  EXPECT_THAT(of(fmt::format(R"({{"scene": "{}"}})", std::string(129, 'a'))),
-              HasSubstr("portal.scene: is not 1 to 128 bytes"));
-  EXPECT_THAT(of(R"({"scene": "hall", "where": 1})"), HasSubstr("unknown field 'where'"));
-  EXPECT_THAT(of(R"({"scene": "hall", "stop": 0})"), HasSubstr("portal.stop: is not in 1"));
-  EXPECT_THAT(of(R"({"scene": "hall", "stop": 257})"), HasSubstr("portal.stop: is not in 1"));
-  EXPECT_THAT(of(R"({"scene": "hall", "tour": 1.5})"), HasSubstr("tour: is no whole number"));
-  EXPECT_THAT(of(R"({"scene": "hall", "position": [0, 0, 0]})"), HasSubstr("orientation"));
-  EXPECT_THAT(of(R"({"scene": "hall", "stop": 1, "position": [0, 0, 0], "look_at": [0, 0, 1]})"),
-              HasSubstr("leads to a view and to a stop"));
+/// What stands behind the fields of the stop, and the field below it that is refused.
+struct InStop {
+  std::string more, field;
+};
+void expect_in_stop(std::initializer_list<InStop> cases) {
+  for (const auto& [more, field] : cases)
+    EXPECT_EQ(mistake(with_stop(", " + more)), "tours[0].stops[0]" + field) << more;
+}
+
+std::string repeated(std::size_t count, const std::string& text) {
+  return fmt::format("{}", fmt::join(std::vector<std::string>(count, text), ","));
+}
+
+TEST(SentSidecar, PortalsAreRefusedByTheFieldThatIsWrong) {
+  expect_in_stop({
+      {R"("portal": 7)", ".portal"},
+      {R"("portal": {})", ".portal"},
+      {R"("portal": {"scene": ""})", ".portal.scene"},
+      {fmt::format(R"("portal": {{"scene": "{}"}})", std::string(129, 'a')), ".portal.scene"},
+      {R"("portal": {"scene": "hall", "where": 1})", ".portal"},
+      {R"("portal": {"scene": "hall", "stop": 0})", ".portal.stop"},
+      {R"("portal": {"scene": "hall", "stop": 257})", ".portal.stop"},
+      {R"("portal": {"scene": "hall", "tour": 1.5})", ".portal.tour"},
+      {R"("portal": {"scene": "hall", "position": [0, 0, 0]})", ".portal"},
+      {R"("portal": {"scene": "hall", "stop": 1, "position": [0, 0, 0], "look_at": [0, 0, 1]})",
+       ".portal"},
+  });
   for (const char* part : {R"("look_at": [0, 0, 1])", R"("orientation": [0, 0, 0, 1])",
-                           R"("fov_deg": 50)", R"("look_at": "nowhere")"}) {
-    EXPECT_THAT(of(fmt::format(R"({{"scene": "hall", {}}})", part)),
-                HasSubstr("'position' is missing"))
-        << part;
-    EXPECT_THAT(of(fmt::format(R"({{"scene": "hall", "tour": 1, {}}})", part)),
-                HasSubstr("leads to a view and to a stop"))
-        << part;
-  }
+                           R"("fov_deg": 50)", R"("look_at": "nowhere")"})
+    for (const char* goal : {R"("scene": "hall")", R"("scene": "hall", "tour": 1)"})
+      expect_in_stop({{fmt::format(R"("portal": {{{}, {}}})", goal, part), ".portal"}});
 }
 
 TEST(SentSidecar, IsRefusedByTheFieldThatIsWrong) {
-  EXPECT_THAT(mistake("{ broken"), HasSubstr("sidecar: byte "));
-  EXPECT_THAT(mistake("[]"), HasSubstr("is not a JSON object"));
-  EXPECT_THAT(mistake(R"({"near": -1})"), HasSubstr("near: is not positive"));
-  EXPECT_THAT(mistake(R"({"start_pose":{"position":[3e38,3e38,3e38],"look_at":[0,0,0]}})"),
-              HasSubstr("start_pose.position: is not a position"));
-  EXPECT_THAT(mistake(R"({"poster": 1})"), HasSubstr("unknown field 'poster'"));
-  EXPECT_THAT(mistake(R"({"tours": {}})"), HasSubstr("tours: is not an array"));
-  EXPECT_THAT(mistake(R"({"tours": [1]})"), HasSubstr("tours[0]: is not an object"));
-  EXPECT_THAT(mistake(R"({"tours": [{"title": "Hall"}]})"), HasSubstr("'stops' is missing"));
-  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "autoplay": 1}]})"),
-              HasSubstr("tours[0].autoplay"));
-  EXPECT_THAT(mistake(with_stop(R"(, "fov_deg": 400)")), HasSubstr("tours[0].stops[0].fov_deg"));
-  EXPECT_THAT(mistake(with_stop(R"(, "stay_s": -1)")), HasSubstr("stay_s: is not in 0"));
-  EXPECT_THAT(mistake(with_stop(R"(, "fly_s": 121)")), HasSubstr("fly_s: is not in 0"));
-  EXPECT_THAT(mistake(with_stop(R"(, "marker": [0, 0])")), HasSubstr("marker"));
-  EXPECT_THAT(mistake(with_stop(R"(, "captoin": "x")")), HasSubstr("unknown field 'captoin'"));
-  EXPECT_THAT(mistake(with_stop(R"(, "caption": 7)")), HasSubstr("caption: is not a text"));
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"[]", "sidecar"},
+      {R"({"near": -1})", "near"},
+      {R"({"start_pose":{"position":[3e38,3e38,3e38],"look_at":[0,0,0]}})", "start_pose.position"},
+      {R"({"poster": 1})", "sidecar"},
+      {R"({"tours": {}})", "tours"},
+      {R"({"tours": [1]})", "tours[0]"},
+      {R"({"tours": [{"title": "Hall"}]})", "tours[0]"},
+      {R"({"tours": [{"stops": [], "autoplay": 1}]})", "tours[0].autoplay"},
+      {R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})", "tours[0].stops[0]"},
+      {R"({"tours": [{"stops": [{"position": [0, 0, 0], "orientation": [0, 0, 0, 0]}]}]})",
+       "tours[0].stops[0].orientation"},
+      {R"({"tours": [{"stops": [{"position": [0, 0, 0], "orientation": [0, 0, 0.995, 0]}]}]})",
+       ""}};
+  for (const auto& [json, field] : cases) EXPECT_EQ(mistake(json), field) << json;
+  EXPECT_THAT(mistake("{ broken"), StartsWith("byte "));
+  expect_in_stop({{R"("fov_deg": 400)", ".fov_deg"},
+                  {R"("stay_s": -1)", ".stay_s"},
+                  {R"("fly_s": 121)", ".fly_s"},
+                  {R"("marker": [0, 0])", ".marker"},
+                  {R"("captoin": "x")", ""},
+                  {R"("caption": 7)", ".caption"}});
+}
+
+TEST(SentSidecar, HasALargestSizeInEachRespect) {
   const auto caption = [](std::size_t bytes) {
     return with_stop(fmt::format(R"(, "caption": "{}")", std::string(bytes, 'x')));
   };
   EXPECT_EQ(mistake(caption(16'000)), "");
-  EXPECT_THAT(mistake(caption(16'001)), HasSubstr("caption: has more than"));
-  EXPECT_THAT(mistake(R"({"tours": [{"stops": [{"position": [0, 0, 0]}]}]})"),
-              HasSubstr("stops[0]: 'look_at' or 'orientation' is missing"));
-  const auto turned = [](const char* orientation) {
-    return fmt::format(
-        R"({{"tours": [{{"stops": [{{"position": [0, 0, 0], "orientation": {}}}]}}]}})",
-        orientation);
-  };
-  EXPECT_EQ(mistake(turned("[0, 0, 0.995, 0]")), "") << "pages round them";
-  EXPECT_THAT(mistake(turned("[0, 0, 0, 0]")),
-              HasSubstr("tours[0].stops[0].orientation: is no quaternion"));
+  EXPECT_EQ(mistake(caption(16'001)), "tours[0].stops[0].caption");
   const auto tours = [](std::size_t count) {
-    const std::vector<std::string> all(count, R"({"stops": []})");
-    return fmt::format(R"({{"tours": [{}]}})", fmt::join(all, ","));
+    return fmt::format(R"({{"tours": [{}]}})", repeated(count, R"({"stops": []})"));
   };
   EXPECT_EQ(mistake(tours(32)), "");
-  EXPECT_THAT(mistake(tours(33)), HasSubstr("tours: has 33 entries, at most 32"));
+  EXPECT_EQ(mistake(tours(33)), "tours");
   const auto stops = [](std::size_t count) {
-    const std::vector<std::string> all(count, std::string(stop) + "}");
-    return fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})", fmt::join(all, ","));
+    return fmt::format(R"({{"tours": [{{"stops": [{}]}}]}})",
+                       repeated(count, std::string(stop) + "}"));
   };
   EXPECT_EQ(mistake(stops(256)), "");
-  EXPECT_THAT(mistake(stops(257)), HasSubstr("tours[0].stops: has 257 entries, at most 256"));
+  EXPECT_EQ(mistake(stops(257)), "tours[0].stops");
+  const auto media = [](std::size_t count) {
+    return with_stop(fmt::format(R"(, "media": [{}])", repeated(count, R"({"src": "a.mp3"})")));
+  };
+  EXPECT_EQ(mistake(media(8)), "");
+  EXPECT_EQ(mistake(media(9)), "tours[0].stops[0].media");
+  const auto languages = [](int count) {
+    std::vector<std::string> all;
+    for (int i = 0; i < count; ++i) all.push_back(fmt::format(R"("x{}": {{}})", i));
+    return with_stop(fmt::format(R"(, "translations": {{{}}})", fmt::join(all, ",")));
+  };
+  EXPECT_EQ(mistake(languages(32)), "");
+  EXPECT_EQ(mistake(languages(33)), "tours[0].stops[0].translations");
   EXPECT_EQ(mistake(std::string((1 << 20) - 2, ' ') + "{}"), "");
-  EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "") << "too large";
+  EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "");
 }
 
 TEST(SentSidecar, MediaAreRefusedByTheFieldThatIsWrong) {
   const auto media = [](const std::string& list) {
     return mistake(with_stop(fmt::format(R"(, "media": [{}])", list)));
   };
-  EXPECT_EQ(media(R"({"src": "a.jpg", "alt": "A door", "translations": {"de": {"alt": "Tür"}}},
-                     {"src": "b.mp4", "captions": "b.vtt"}, {"src": "c.mp3"})"),
-            "");
-  EXPECT_THAT(media(R"({"alt": "x"})"), HasSubstr("media[0]: 'src' is missing"));
-  EXPECT_THAT(media(R"({"src": "a.jpg"})"), HasSubstr("media[0]: 'alt' is missing"));
-  EXPECT_THAT(media(R"({"src": "a.jpg", "alt": ""})"), HasSubstr("media[0].alt: is empty"));
-  EXPECT_THAT(media(R"({"src": "a.svg", "alt": "x"})"),
-              HasSubstr("media[0].src: has no extension"));
-  EXPECT_THAT(media(R"({"src": "a.vtt"})"), HasSubstr("is a file of captions"));
-  EXPECT_THAT(media(R"({"src": "a.mp4", "captions": "a.txt"})"), HasSubstr("no name of a .vtt"));
-  EXPECT_THAT(media(R"({"src": "a.mp4", "captions": "../a.vtt"})"), HasSubstr("no name of a .vtt"));
-  EXPECT_THAT(media(R"({"src": "a.mp4", "autoplay": true})"), HasSubstr("unknown field"));
-  EXPECT_THAT(media(R"({"src": "a.mp4", "type": "image", "alt": "x"})"),
-              HasSubstr("media[0].type"));
-  for (const char* src : {"../a.jpg", "/a.jpg", "a/b.jpg", ".a.jpg", ""})
-    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
-                HasSubstr("src: is no name of a file"));
-  for (const char* src : {"http://media.example/a.jpg", "javascript:alert(1)", "data:image/png,x"})
-    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
-                HasSubstr("src: is no https address"));
-  for (const char* src : {"https://media.example.evil.example/a.jpg", "https://evil.example/a.jpg"})
-    EXPECT_THAT(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
-                HasSubstr("src: is at no site"));
-  const auto entries = [&](std::size_t count) {
-    return media(
-        fmt::format("{}", fmt::join(std::vector<std::string>(count, R"({"src": "a.mp3"})"), ",")));
-  };
-  EXPECT_EQ(entries(8), "");
-  EXPECT_THAT(entries(9), HasSubstr("media: has 9 entries, at most 8"));
-}
-
-TEST(SentSidecar, ForeignMediaHaveAKind) {
-  const auto at = [](const std::string& medium) {
-    try {
-      check_sent_sidecar(with_stop(fmt::format(R"(, "media": [{}])", medium)),
-                         {"https://media.example"});
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_EQ(at(R"({"src": "https://media.example/a.mp4?x=1"})"), "");
-  EXPECT_EQ(at(R"({"src": "https://media.example/film", "type": "video"})"), "");
-  EXPECT_THAT(at(R"({"src": "https://media.example/film"})"), HasSubstr("give it a type"));
-  EXPECT_THAT(at(R"({"src": "https://media.example/film", "type": "page"})"),
-              HasSubstr("type: is"));
+  for (const char* good :
+       {R"({"src": "a.jpg", "alt": "A door", "translations": {"de": {"alt": "Tür"}}},
+           {"src": "b.mp4", "captions": "b.vtt"}, {"src": "c.mp3"})",
+        R"({"src": "https://media.example/a.mp4?x=1"})",
+        R"({"src": "https://media.example/film", "type": "video"})"})
+    EXPECT_EQ(media(good), "") << good;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {R"({"alt": "x"})", ""},
+      {R"({"src": "a.jpg"})", ""},
+      {R"({"src": "a.jpg", "alt": ""})", ".alt"},
+      {R"({"src": "a.svg", "alt": "x"})", ".src"},
+      {R"({"src": "a.vtt"})", ".src"},
+      {R"({"src": "a.mp4", "captions": "a.txt"})", ".captions"},
+      {R"({"src": "a.mp4", "captions": "../a.vtt"})", ".captions"},
+      {R"({"src": "a.mp4", "autoplay": true})", ""},
+      {R"({"src": "a.mp4", "type": "image", "alt": "x"})", ".type"},
+      {R"({"src": "https://media.example/film"})", ".src"},
+      {R"({"src": "https://media.example/film", "type": "page"})", ".type"}};
+  for (const auto& [medium, field] : cases)
+    EXPECT_EQ(media(medium), "tours[0].stops[0].media[0]" + field) << medium;
+  for (const char* src : {"../a.jpg", "/a.jpg", "a/b.jpg", ".a.jpg", "",
+                          "http://media.example/a.jpg", "javascript:alert(1)", "data:image/png,x",
+                          "https://media.example.evil.example/a.jpg", "https://evil.example/a.jpg"})
+    EXPECT_EQ(media(fmt::format(R"({{"src": "{}", "alt": "x"}})", src)),
+              "tours[0].stops[0].media[0].src")
+        << src;
 }
 
 TEST(SentSidecar, NarrationAndSoundAreSounds) {
   EXPECT_EQ(mistake(with_stop(R"(, "narration": {"src": "a.mp3", "captions": "a.vtt"})")), "");
-  EXPECT_THAT(mistake(with_stop(R"(, "narration": {"src": "a.mp4"})")),
-              HasSubstr("narration.src: is no sound"));
-  EXPECT_THAT(mistake(with_stop(R"(, "narration": {"src": "a.mp3", "volume": 1})")),
-              HasSubstr("unknown field 'volume'"));
+  expect_in_stop({{R"("narration": {"src": "a.mp4"})", ".narration.src"},
+                  {R"("narration": {"src": "a.mp3", "volume": 1})", ".narration"}});
   const auto sound = [](const std::string& fields) {
     return mistake(fmt::format(R"({{"tours": [{{"stops": [], "sound": {}}}]}})", fields));
   };
   EXPECT_EQ(sound(R"({"src": "sea.ogg", "volume": 0.5})"), "");
-  EXPECT_THAT(sound(R"({"src": "sea.jpg"})"), HasSubstr("tours[0].sound.src: is no sound"));
-  EXPECT_THAT(sound(R"({"src": "sea.ogg", "volume": 2})"), HasSubstr("volume: is not in 0"));
+  EXPECT_EQ(sound(R"({"src": "sea.jpg"})"), "tours[0].sound.src");
+  EXPECT_EQ(sound(R"({"src": "sea.ogg", "volume": 2})"), "tours[0].sound.volume");
 }
 
 TEST(SentSidecar, TranslationsAreRefusedByTheFieldThatIsWrong) {
-  const auto translated = [](const std::string& translations) {
-    return mistake(with_stop(fmt::format(R"(, "translations": {})", translations)));
-  };
-  EXPECT_EQ(translated(R"({"de": {"title": "Halle"}, "zh-Hans": {"caption": "x"}, "gsw": {}})"),
+  EXPECT_EQ(mistake(with_stop(R"(, "translations":
+      {"de": {"title": "Halle"}, "zh-Hans": {"caption": "x"}, "gsw": {}})")),
             "");
-  EXPECT_THAT(translated("[]"), HasSubstr("tours[0].stops[0].translations: is not an object"));
-  EXPECT_THAT(translated(R"({"de": "Halle"})"), HasSubstr("translations.de: is not an object"));
-  EXPECT_THAT(translated(R"({"de": {"titel": ""}})"), HasSubstr("unknown field 'titel'"));
-  EXPECT_THAT(translated(R"({"de": {"title": 1}})"), HasSubstr("translations.de.title"));
+  expect_in_stop({{R"("translations": [])", ".translations"},
+                  {R"("translations": {"de": "Halle"})", ".translations.de"},
+                  {R"("translations": {"de": {"titel": ""}})", ".translations.de"},
+                  {R"("translations": {"de": {"title": 1}})", ".translations.de.title"}});
   for (const char* tag :
        {"", "d", "de_CH", "-de", "de-", "de--CH", "deutschland", "<b>", "\u0000d"})
-    EXPECT_THAT(translated(fmt::format(R"({{"{}": {{}}}})", tag)), HasSubstr("is no language"));
-  EXPECT_THAT(mistake(R"({"tours": [{"stops": [], "translations": {"de": {"caption": ""}}}]})"),
-              HasSubstr("unknown field 'caption'"));
-  const auto languages = [](int count) {
-    std::vector<std::string> all;
-    for (int i = 0; i < count; ++i) all.push_back(fmt::format(R"("x{}": {{}})", i));
-    return fmt::format("{{{}}}", fmt::join(all, ","));
-  };
-  EXPECT_EQ(translated(languages(32)), "");
-  EXPECT_THAT(translated(languages(33)), HasSubstr("has 33 languages, at most 32"));
+    expect_in_stop({{fmt::format(R"("translations": {{"{}": {{}}}})", tag), ".translations"}});
+  EXPECT_EQ(mistake(R"({"tours": [{"stops": [], "translations": {"de": {"caption": ""}}}]})"),
+            "tours[0].translations.de");
 }
 
 }  // namespace

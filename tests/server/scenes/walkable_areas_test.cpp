@@ -1,33 +1,21 @@
 // Scenes of a real library, and where people can walk in them.
 #include "server/scenes/walkable_areas.h"
 
-#include <atomic>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <optional>
-#include <thread>
-
 #include <fmt/format.h>
 #include <glm/gtc/quaternion.hpp>
 #include <sys/stat.h>
 
-#include "render_core/base/thread_pool.h"
-#include "render_core/scene/files/save_scene.h"
 #include "render_core/walk/walk_file.h"
-#include "server/scenes/scene_library.h"
-#include "tests/render_core/scene/scene_test_support.h"
 #include "tests/render_core/walk/worlds.h"
+#include "tests/server/scenes/scene_library_fixture.h"
 #include "tests/support/walker.h"
 
 namespace catgs::test {
 namespace {
 
-using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 using Ground = std::shared_ptr<const WalkableArea>;
-using Entry = std::shared_ptr<const SceneEntry>;
 
 constexpr auto sidecar =
     R"({"up": [0, 0, 1], "start_pose": {"position": [2, 2, 1.6], "look_at": [2, 5, 1.6]}, "metres_per_unit": 1})";
@@ -41,7 +29,7 @@ walk::WalkMap map_in(const std::string& bytes) {
   return walk::read_walk_file(MemorySource("served", std::as_bytes(std::span(bytes))));
 }
 
-class WalkableAreasTest : public FolderTest {
+class WalkableAreasTest : public LibraryTest {
  protected:
   void SetUp() override {
     fs::create_directory(folder_ / "scenes");
@@ -51,31 +39,9 @@ class WalkableAreasTest : public FolderTest {
     config_.scene_folders = {folder_ / "scenes"};
     config_.cache_dir = folder_ / "cache";
   }
-  void start() {
-    library_.reset();  // which takes the cache with it
-    io_.emplace();     // and what the library has asked of it
-    library_ = std::make_unique<SceneLibrary>(
-        config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
-        *io_, metrics_, [this] { return now_; });
-  }
-  void run_until(const std::function<bool()>& holds) {
-    for (int i = 0; i < 120'000 && !holds(); ++i) {
-      io_->restart();
-      io_->poll();
-      library_->on_tick(now_);
-      std::this_thread::sleep_for(1ms);
-    }
-    ASSERT_TRUE(holds());
-  }
-  std::string id() const { return library_->resolve("a"); }
-  Entry load() {
-    run_until([&] { return std::holds_alternative<Entry>(library_->want(id(), now_)); });
-    return library_->in_memory(id());
-  }
-  Ground listed() const {
-    const auto listing = library_->listing();
-    return std::ranges::find(*listing, id(), &SceneLibrary::Listing::id)->walkable_area;
-  }
+  std::string id() const { return LibraryTest::id("a"); }
+  Entry load() { return visit("a"); }
+  Ground listed() const { return LibraryTest::listed("a").walkable_area; }
   /// As a page does that asks again and again.
   Ground found() {
     run_until([&] {
@@ -90,13 +56,6 @@ class WalkableAreasTest : public FolderTest {
       if (entry.path().extension() == ".walk") files.push_back(entry.path());
     return files;
   }
-
-  Background background_;
-  std::optional<boost::asio::io_context> io_;
-  Metrics metrics_;
-  ServerConfig config_;
-  std::unique_ptr<SceneLibrary> library_;
-  TimePoint now_ = TimePoint{} + 1h;
 };
 
 TEST_F(WalkableAreasTest, AScenesGroundIsFoundWhenAPageAsks) {
@@ -179,7 +138,7 @@ TEST_F(WalkableAreasTest, ASceneWithoutGroundIsLookedThroughOnce) {
   EXPECT_EQ(found()->file, nullptr);
 }
 
-TEST_F(WalkableAreasTest, WithoutAFolderItStaysWhileTheSceneDoes) {
+TEST_F(WalkableAreasTest, StaysWithItsSceneWhenThereIsNoFolder) {
   config_.cache_dir.clear();
   start();
   load();
@@ -260,7 +219,7 @@ TEST_F(WalkableAreasTest, TheLibraryEndsWhileAGroundIsSought) {
 }
 
 /// Its header tells how large it is.
-TEST(ComputedWalkableArea, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
+TEST(ComputedWalkableArea, NeedsTheCacheForManyGaussians) {
   const TemporaryFolder folder;
   const auto error = [&](int gaussians) {
     WalkableAreaSource source;
@@ -270,12 +229,12 @@ TEST(ComputedWalkableArea, OfManyGaussiansIsNotFoundByReadingThemAsAWhole) {
                                                        gaussians)));
     return input_error([&] { compute_walkable_area(source, 2, [] {}); });
   };
-  EXPECT_THAT(error(4'000'001), ::testing::HasSubstr("--cache-dir"));
-  EXPECT_THAT(error(4'000'000), ::testing::Not(::testing::HasSubstr("--cache-dir")));
+  EXPECT_THAT(error(4'000'001), HasSubstr("--cache-dir"));
+  EXPECT_THAT(error(4'000'000), Not(HasSubstr("--cache-dir")));
 }
 
-/// The public demo: its walkable area is found without its file.
-TEST(ComputedWalkableArea, OfAProceduralScene) {
+/// The public demo: its ground is found without its file.
+TEST(ComputedWalkableArea, IsFoundInAProceduralScene) {
   WalkableAreaSource source;
   source.scene.given = "synth:stress:100000";
   source.start = {0, -1.6f, -5};

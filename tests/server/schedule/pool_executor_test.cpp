@@ -1,9 +1,6 @@
 #include "server/schedule/pool_executor.h"
 
-#include <future>
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
@@ -79,7 +76,19 @@ class WatchedEncoder final : public Encoder {
   std::thread::id* on_;
 };
 
-TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
+std::unique_ptr<Encoder> refuse(EncoderKind, const EncoderSettings&) {
+  throw std::runtime_error("no session left");
+}
+
+FrameResult drawn(PoolExecutor& executor, const std::shared_ptr<Stream>& stream) {
+  std::promise<FrameResult> done;
+  FrameJob job;
+  job.stream = stream;
+  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
+  return done.get_future().get();
+}
+
+TEST(PoolExecutor, OtherThreadsEncodeWhenGpusRender) {
   std::thread::id rendered_on, encoded_on;
   PoolExecutor executor({std::make_shared<ThreadPool>(3), {{0, std::make_shared<ThreadPool>(2)}}},
                         [&](EncoderKind, const EncoderSettings&) {
@@ -88,35 +97,12 @@ TEST(PoolExecutor, WhereGpusRenderOthersEncode) {
   EXPECT_EQ(executor.slots(), 5);
   auto stream = std::make_shared<Stream>();
   stream->view = std::make_unique<WatchedView>(&rendered_on);
-  std::promise<FrameResult> done;
-  FrameJob job;
-  job.stream = stream;
-  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
-  const FrameResult result = done.get_future().get();
+  const FrameResult result = drawn(executor, stream);
   EXPECT_TRUE(result.ok);
   EXPECT_NE(rendered_on, std::thread::id());
   EXPECT_NE(encoded_on, std::thread::id());
   EXPECT_NE(rendered_on, encoded_on);
   EXPECT_LE(result.frame.ticket.render->end, result.frame.ticket.encode->start);
-  executor.close(std::move(stream));
-}
-
-TEST(PoolExecutor, WithoutAnEncoderAFrameHasNoTimeOfEncoding) {
-  std::thread::id rendered_on;
-  PoolExecutor executor({std::make_shared<ThreadPool>(1)},
-                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
-                          throw std::runtime_error("the driver refuses another one");
-                        });
-  auto stream = std::make_shared<Stream>();
-  stream->view = std::make_unique<WatchedView>(&rendered_on);
-  std::promise<FrameResult> done;
-  FrameJob job;
-  job.stream = stream;
-  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
-  const FrameResult result = done.get_future().get();
-  EXPECT_EQ(result.fault, Fault::encoder_unavailable);
-  EXPECT_TRUE(result.frame.ticket.render);
-  EXPECT_FALSE(result.frame.ticket.encode);
   executor.close(std::move(stream));
 }
 
@@ -147,37 +133,28 @@ TEST(PoolExecutor, NoGpuWaitsForFramesOfAnother) {
 }
 
 TEST(PoolExecutor, AnEncoderThatCannotBeOpenedIsTold) {
-  PoolExecutor executor({std::make_shared<ThreadPool>(1), {{0, std::make_shared<ThreadPool>(1)}}},
-                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
-                          throw std::runtime_error("no session left");
-                        });
-  std::thread::id rendered_on;
-  auto stream = std::make_shared<Stream>();
-  stream->view = std::make_unique<WatchedView>(&rendered_on);
-  std::promise<StreamOpened> done;
-  executor.open(stream, {}, [&](StreamOpened opened) { done.set_value(std::move(opened)); });
-  const StreamOpened opened = done.get_future().get();
-  EXPECT_FALSE(opened.ok);
-  EXPECT_EQ(opened.fault, Fault::encoder_unavailable);
-  EXPECT_EQ(opened.message, "no session left");
-  executor.close(std::move(stream));
-}
+  const PoolExecutor::Pools on_gpu{std::make_shared<ThreadPool>(1),
+                                   {{0, std::make_shared<ThreadPool>(1)}}};
+  for (const auto& pools : {on_gpu, PoolExecutor::Pools{std::make_shared<ThreadPool>(1)}}) {
+    PoolExecutor executor(pools, refuse);
+    std::thread::id rendered_on;
+    auto stream = std::make_shared<Stream>();
+    stream->view = std::make_unique<WatchedView>(&rendered_on);
+    std::promise<StreamOpened> done;
+    executor.open(stream, {}, [&](StreamOpened opened) { done.set_value(std::move(opened)); });
+    const StreamOpened opened = done.get_future().get();
+    EXPECT_FALSE(opened.ok);
+    EXPECT_EQ(opened.fault, Fault::encoder_unavailable);
+    EXPECT_EQ(opened.message, "no session left");
 
-TEST(PoolExecutor, AFrameWhoseEncoderCannotBeOpenedIsTold) {
-  PoolExecutor executor({std::make_shared<ThreadPool>(1), {{0, std::make_shared<ThreadPool>(1)}}},
-                        [](EncoderKind, const EncoderSettings&) -> std::unique_ptr<Encoder> {
-                          throw std::runtime_error("no session left");
-                        });
-  std::thread::id rendered_on;
-  FrameJob job;
-  job.stream = std::make_shared<Stream>();
-  job.stream->view = std::make_unique<WatchedView>(&rendered_on);
-  std::promise<FrameResult> done;
-  executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
-  const FrameResult result = done.get_future().get();
-  EXPECT_FALSE(result.ok);
-  EXPECT_EQ(result.fault, Fault::encoder_unavailable);
-  EXPECT_EQ(result.message, "no session left");
+    const FrameResult result = drawn(executor, stream);
+    EXPECT_FALSE(result.ok);
+    EXPECT_EQ(result.fault, Fault::encoder_unavailable);
+    EXPECT_EQ(result.message, "no session left");
+    EXPECT_TRUE(result.frame.ticket.render);
+    EXPECT_FALSE(result.frame.ticket.encode) << "it has no encoding time";
+    executor.close(std::move(stream));
+  }
 }
 
 TEST(StreamEncoders, KeepsTheTwoUsedLast) {

@@ -1,19 +1,10 @@
 #include "server/schedule/scheduler.h"
 
-#include <algorithm>
-#include <optional>
-#include <random>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "server/schedule/next_frame_cost.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 /// Somebody who offers a frame, and counts how often that was asked.
 struct Source {
@@ -65,7 +56,7 @@ TEST(FrameScheduler, TakesTheEarliestDeadlineOfThoseReady) {
   EXPECT_FALSE(scheduler.next_ready());
 }
 
-TEST(FrameScheduler, WhatTakesLongerStartsEarlier) {
+TEST(FrameScheduler, LongerFramesStartEarlier) {
   Scheduler scheduler(1);
   Source quick{FrameCandidate{now, now + 10ms, 2ms}};
   Source slow{FrameCandidate{now, now + 12ms, 8ms}};

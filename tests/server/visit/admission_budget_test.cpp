@@ -1,8 +1,6 @@
 #include "server/visit/admission_budget.h"
 
-#include <vector>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {

@@ -1,6 +1,7 @@
 #include "server/visit/admission_controller.h"
 
 #include "tests/server/visit/sessions_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
@@ -48,7 +49,7 @@ struct MeasuredAdmission : SessionsTest {
   }
 };
 
-TEST_F(MeasuredAdmission, WhoWishesForTooManyPixelsGetsFewerAndIsInNobodysWay) {
+TEST_F(MeasuredAdmission, ARequestForTooManyPixelsGetsFewerAndDelaysNobody) {
   start(20.0f);
   join();
   measure();
@@ -61,7 +62,7 @@ TEST_F(MeasuredAdmission, WhoWishesForTooManyPixelsGetsFewerAndIsInNobodysWay) {
   EXPECT_EQ(honest->welcome->config().width_px(), 160u);
 }
 
-TEST_F(MeasuredAdmission, WhoTakesMoreThanAnEqualShareGivesPixelsUpWhileOthersNeedThem) {
+TEST_F(MeasuredAdmission, SessionsAboveAnEqualShareAreScaledDownWhileOthersNeedIt) {
   start(300.0f);
   const auto greedy = join({}, "192.0.2.2", wish_for_4k).connection;
   EXPECT_EQ(greedy->welcome->config().width_px(), 3840u) << "nobody else is there";
@@ -74,7 +75,7 @@ TEST_F(MeasuredAdmission, WhoTakesMoreThanAnEqualShareGivesPixelsUpWhileOthersNe
 
 void wish_for_a_frame_a_second(v1::Hello& hello) { hello.mutable_settings()->set_max_fps(1); }
 
-TEST_F(MeasuredAdmission, WhoFindsNoRoomIsNotInTheWayOfWhoDoes) {
+TEST_F(MeasuredAdmission, ASessionWithoutRoomDoesNotBlockSmallerOnes) {
   start(90.0f);
   join();
   measure();
@@ -83,7 +84,7 @@ TEST_F(MeasuredAdmission, WhoFindsNoRoomIsNotInTheWayOfWhoDoes) {
   EXPECT_TRUE(join({}, "192.0.2.2", wish_for_a_frame_a_second).connection->welcome);
 }
 
-TEST_F(MeasuredAdmission, WhoHasWaitedForLongIsNotOvertakenAnyMore) {
+TEST_F(MeasuredAdmission, ALongWaitEndsOvertaking) {
   options.policy.overtaken_at_most = 0ms;
   start(90.0f);
   join();
@@ -105,10 +106,10 @@ TEST_F(AdmissionControllerTest, NobodyWaitsWithoutEnd) {
   ASSERT_TRUE(connection->waits);
   run_until([&] { return connection->error.has_value(); });
   EXPECT_EQ(connection->error->code(), v1::Error::SERVER_FULL);
-  EXPECT_THAT(connection->error->message(), testing::HasSubstr("no place came free"));
+  EXPECT_THAT(connection->error->message(), HasSubstr("no place came free"));
 }
 
-TEST_F(AdmissionControllerTest, WhoWaitsForMeasurementsIsToldSo) {
+TEST_F(AdmissionControllerTest, AWaitForMeasurementsIsTold) {
   options.min_fps = 10;
   options.cpus = 1;
   options.max_queue = 1;
@@ -118,8 +119,7 @@ TEST_F(AdmissionControllerTest, WhoWaitsForMeasurementsIsToldSo) {
   EXPECT_EQ(clients.back().connection->estimate_s, 3u);
   const Visitor& third = join();
   ASSERT_TRUE(third.connection->error);
-  EXPECT_THAT(third.connection->error->message(),
-              testing::HasSubstr("1 wait for it: try again in 3 s"));
+  EXPECT_THAT(third.connection->error->message(), HasSubstr("1 wait for it: try again in 3 s"));
 }
 
 }  // namespace

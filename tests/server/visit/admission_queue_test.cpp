@@ -1,33 +1,31 @@
 #include "server/visit/admission_queue.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using namespace std::chrono_literals;
-
-constexpr TimePoint now{};
+constexpr TimePoint start{};
 
 TEST(AdmissionQueue, FirstComeFirstServedUpToItsLimit) {
   AdmissionQueue queue(3);
-  EXPECT_EQ(queue.join("a", now), 1);
-  EXPECT_EQ(queue.join("b", now), 2);
-  EXPECT_EQ(queue.join("c", now), 3);
-  EXPECT_EQ(queue.join("d", now), std::nullopt) << "full";
-  EXPECT_EQ(queue.join("b", now), 2) << "asking again moves nobody";
+  EXPECT_EQ(queue.join("a", start), 1);
+  EXPECT_EQ(queue.join("b", start), 2);
+  EXPECT_EQ(queue.join("c", start), 3);
+  EXPECT_EQ(queue.join("d", start), std::nullopt) << "full";
+  EXPECT_EQ(queue.join("b", start), 2) << "asking again moves nobody";
   queue.leave("nobody");
   queue.leave("a");
   ASSERT_EQ(queue.waiting().size(), 2u);
   EXPECT_EQ(queue.waiting().front().session_id, "b");
-  EXPECT_EQ(queue.join("d", now), 3);
+  EXPECT_EQ(queue.join("d", start), 3);
   queue.leave("c");
-  EXPECT_EQ(queue.join("d", now), 2) << "those behind move up";
+  EXPECT_EQ(queue.join("d", start), 2) << "those behind move up";
 }
 
 TEST(AdmissionQueue, NobodyWaitsWithoutRoom) {
   AdmissionQueue queue(0);
-  EXPECT_EQ(queue.join("a", now), std::nullopt);
+  EXPECT_EQ(queue.join("a", start), std::nullopt);
   EXPECT_TRUE(queue.empty());
 }
 

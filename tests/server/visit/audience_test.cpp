@@ -1,33 +1,14 @@
 #include "server/visit/audience.h"
 
-#include <gtest/gtest.h>
+#include "tests/server/visit/places_fixture.h"
 
-namespace catgs {
+namespace catgs::test {
 namespace {
-
-using namespace std::chrono_literals;
-
-struct FakeConnection final : Connection {
-  int messages = 0;
-  std::vector<std::uint64_t> frames;
-  bool full = false;  // of frames that are not read
-  std::optional<CloseCode> closed;
-
-  void send(OutgoingMessage) override { ++messages; }
-  std::vector<std::uint64_t> send(OutgoingFrame frame) override {
-    if (full) return {frame.ticket.frame_id};
-    frames.push_back(frame.ticket.frame_id);
-    return {};
-  }
-  void close(CloseCode code, std::string_view) override { closed = code; }
-  [[nodiscard]] std::string peer_address() const override { return "192.0.2.1"; }
-  [[nodiscard]] std::size_t queued_frames() const override { return 0; }
-};
 
 class AudienceTest : public testing::Test {
  protected:
-  std::shared_ptr<FakeConnection> join() {
-    auto connection = std::make_shared<FakeConnection>();
+  std::shared_ptr<OpenConnection> join() {
+    auto connection = std::make_shared<OpenConnection>();
     spectators.push_back(std::make_shared<ClientConnection>(io, metrics, connection, [] {}));
     audience.add(spectators.back(), Welcome{});
     return connection;
@@ -76,7 +57,7 @@ TEST_F(AudienceTest, APresentationEndsWithItsScene) {
 }
 
 TEST_F(AudienceTest, FollowersHearOfACameraThirtyTimesASecondAtMost) {
-  const auto connection = std::make_shared<FakeConnection>();
+  const auto connection = std::make_shared<OpenConnection>();
   const auto follower = std::make_shared<ClientConnection>(io, metrics, connection, [] {});
   audience.tour().begin({true, "Ada"}, now);
   audience.tour().add(follower);
@@ -148,4 +129,4 @@ TEST_F(AudienceTest, EndsWithTheSession) {
 }
 
 }  // namespace
-}  // namespace catgs
+}  // namespace catgs::test

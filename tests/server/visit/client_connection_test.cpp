@@ -1,8 +1,7 @@
 #include "server/visit/client_connection.h"
 
-#include <thread>
-
 #include "tests/server/visit/sessions_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {

@@ -1,13 +1,9 @@
 #include "server/visit/encoder_effort.h"
 
-#include <algorithm>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 constexpr glm::ivec2 full_hd(1920, 1080);
 constexpr int ultrafast = 0, superfast = 2;
@@ -142,7 +138,7 @@ TEST_F(EffortControlTest, AnEncoderThatCannotKeepUpGoesFasterThoughOthersRest) {
   EXPECT_EQ(count(superfast), 8);
 }
 
-TEST_F(EffortControlTest, WhatDidNotHoldIsTriedLessAndLess) {
+TEST_F(EffortControlTest, APresetThatDidNotHoldIsTriedLessOften) {
   add(30, 0.15);
   const auto tries = [&](std::chrono::minutes span) {
     int rises = 0;
@@ -200,13 +196,6 @@ TEST_F(EffortControlTest, NoMoreThanHalfOfTheSessionsChangeAtOnce) {
   add(40, 0.5);
   run(1s);
   EXPECT_EQ(run(500ms), 20);
-}
-
-TEST(EncoderEffort, BecomesSettings) {
-  EncoderSettings settings;
-  apply({ultrafast, 4}, settings);
-  EXPECT_EQ(settings.x264_preset, "ultrafast");
-  EXPECT_EQ(settings.threads, 4);
 }
 
 }  // namespace

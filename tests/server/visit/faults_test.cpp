@@ -1,17 +1,26 @@
 // What fails under the sessions, by interfaces that fail: Renderer, View, Encoder, the pool, the
 // clock. Each fault is told, counted, and nobody else's.
 
-#include <future>
-
 #include "tests/server/visit/sessions_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
 
-using testing::HasSubstr;
-
 class Faults : public SessionsTest {
  protected:
+  Faults() {
+    on_devices_lost = [this](const std::string& why) {
+      ++given_up;
+      why_given_up = why;
+    };
+  }
+  /// A server with so many visitors, who see frames.
+  void begin(int visitors) {
+    start();
+    for (int i = 0; i < visitors; ++i) join();
+    move_on(3);
+  }
   void only_x264() { encoders = {{EncoderKind::x264, Codec::h264, "libx264"}}; }
   [[nodiscard]] int failed_frames() const {
     return static_cast<int>(metrics.frames_failed.Value());
@@ -33,6 +42,8 @@ class Faults : public SessionsTest {
   const std::shared_future<void> released = release.get_future().share();
   std::atomic<bool> hold{false};
   std::atomic<int> held{0};
+  int given_up = 0;
+  std::string why_given_up;
 };
 
 TEST_F(Faults, MessagesWaitForASessionThreadThatIsBusyUpToABound) {
@@ -59,10 +70,7 @@ TEST_F(Faults, MessagesWaitForASessionThreadThatIsBusyUpToABound) {
 
 TEST_F(Faults, AnEncoderThatFailsIsOpenedAnew) {
   only_x264();
-  start();
-  join();
-  join();
-  move_on(3);
+  begin(2);
   const int opened = encoding.opened;
   const int idrs = clients[0].connection->idrs + clients[1].connection->idrs;
   encoding.frames_that_fail = 1;
@@ -74,9 +82,8 @@ TEST_F(Faults, AnEncoderThatFailsIsOpenedAnew) {
 }
 
 TEST_F(Faults, AnNvencThatFailsMakesWayForX264) {
-  start();
-  const Visitor& visitor = join();
-  move_on(3);
+  begin(1);
+  const Visitor& visitor = clients[0];
   encoding.frames_that_fail = 1;
   move_until([&] { return failed_frames() == 1; });
   move_on(3);
@@ -104,9 +111,7 @@ TEST_F(Faults, EncodersThatAlwaysFailEndTheirSessionsWithTheReason) {
 }
 
 TEST_F(Faults, AFrameWithoutMemoryIsDrawnAgain) {
-  start();
-  join();
-  move_on(3);
+  begin(1);
   renderer->frames_without_memory = 2;
   move_until([&] { return failed_frames() == 2; });
   move_on(3);
@@ -114,12 +119,8 @@ TEST_F(Faults, AFrameWithoutMemoryIsDrawnAgain) {
   EXPECT_EQ(renderer->views_made, 1) << "it kept its View";
 }
 
-TEST_F(Faults, WhoFindsNoDeviceMemoryMayComeBack) {
-  int lost = 0;
-  on_devices_lost = [&](const auto&) { ++lost; };
-  start();
-  join();
-  move_on(3);
+TEST_F(Faults, AVisitorWithoutDeviceMemoryMayComeBack) {
+  begin(1);
   renderer->full[0] = renderer->full[1] = true;
   for (int i = 0; i < 3; ++i) {
     const auto refused = join().connection;
@@ -131,52 +132,38 @@ TEST_F(Faults, WhoFindsNoDeviceMemoryMayComeBack) {
   }
   EXPECT_EQ(failed_streams(), 3);
   move_on(3);
-  EXPECT_EQ(lost, 0) << "the device works";
+  EXPECT_EQ(given_up, 0) << "the device works";
   renderer->full[0] = renderer->full[1] = false;
   EXPECT_TRUE(join().connection->welcome);
   move_on(3);
 }
 
 TEST_F(Faults, SessionsOfALostDeviceGoOnOnAnother) {
-  std::string lost;
-  on_devices_lost = [&](const std::string& why) { lost = why; };
-  start();
-  join();
-  join();
-  move_on(3);
+  begin(2);
   ASSERT_EQ(devices->views(), (std::map<int, int>{{0, 1}, {1, 1}}));
   renderer->lost[0] = true;
   move_until([&] { return failed_frames() == 1; });
   move_on(3);
   EXPECT_EQ(devices->views(), (std::map<int, int>{{0, 0}, {1, 2}}));
   EXPECT_TRUE(nobody_is_told());
-  EXPECT_EQ(lost, "");
+  EXPECT_EQ(given_up, 0);
 }
 
-TEST_F(Faults, WithoutAnyDeviceTheServerGivesUp) {
-  std::string lost;
-  on_devices_lost = [&](const std::string& why) { lost = why; };
-  start();
-  join();
-  join();
-  move_on(3);
+TEST_F(Faults, TheServerGivesUpWhenNoDeviceIsLeft) {
+  begin(2);
   renderer->lost[0] = renderer->lost[1] = true;
   move_until([&] { return closed() == 2; });
   for (const auto& client : clients) {
     EXPECT_EQ(client.connection->error->code(), v1::Error::INTERNAL) << "pages come again";
     EXPECT_EQ(client.connection->closed, CloseCode::try_again_later);
   }
-  EXPECT_THAT(lost, HasSubstr("illegal memory access"));
+  EXPECT_THAT(why_given_up, HasSubstr("illegal memory access"));
   EXPECT_EQ(failed_frames(), 2);
   EXPECT_EQ(failed_streams(), 2);
 }
 
 TEST_F(Faults, AFullDeviceBesideALostOneServesThoseItHas) {
-  int given_up = 0;
-  on_devices_lost = [&](const auto&) { ++given_up; };
-  start();
-  for (int i = 0; i < 3; ++i) join();
-  move_on(3);
+  begin(3);
   ASSERT_EQ(devices->views(), (std::map<int, int>{{0, 2}, {1, 1}}));
   renderer->full[1] = true;
   renderer->lost[0] = true;
@@ -196,8 +183,6 @@ TEST_F(Faults, AFullDeviceBesideALostOneServesThoseItHas) {
 }
 
 TEST_F(Faults, OneRefusalWithoutAFailedFrameIsNoLostDevice) {
-  int lost = 0;
-  on_devices_lost = [&](const auto&) { ++lost; };
   start();
   for (int i = 0; i < 3; ++i) {  // a driver that is being reset, now and then
     renderer->lost[0] = renderer->lost[1] = true;
@@ -212,7 +197,7 @@ TEST_F(Faults, OneRefusalWithoutAFailedFrameIsNoLostDevice) {
       return std::ranges::all_of(views, [](const auto& view) { return view.second == 0; });
     });
   }
-  EXPECT_EQ(lost, 0);
+  EXPECT_EQ(given_up, 0);
 }
 
 TEST_F(Faults, ASaturatedPoolSilencesNobody) {
@@ -221,10 +206,7 @@ TEST_F(Faults, ASaturatedPoolSilencesNobody) {
     ++held;
     released.wait();
   };
-  start();
-  join();
-  join();
-  move_on(3);
+  begin(2);
   hold = true;
   move_until([&] { return held == pool_threads; });  // each thread has a frame that does not end
   const auto frames = metrics.frames_rendered.Value();

@@ -2,14 +2,10 @@
 
 #include "server/visit/frame_loop.h"
 
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class FrameLoopTest : public testing::Test {
  protected:
@@ -67,10 +63,13 @@ class FrameLoopTest : public testing::Test {
     ack(order, pose_age_us);
     return order;
   }
+  void next_pose(bool at_rest = false) {
+    ++poses;
+    pose(poses, static_cast<float>(poses), at_rest);
+  }
   FrameOrder moved() {
     now += 17ms;
-    ++poses;
-    pose(poses, static_cast<float>(poses));
+    next_pose();
     return run();
   }
   FrameOrder rested() {
@@ -174,8 +173,7 @@ TEST_F(FrameLoopTest, TellsTheEncoderItsRealRate) {
   const auto run_at = [&](std::chrono::milliseconds interval, int count) {
     for (int i = 0; i < count; ++i) {
       now += interval;
-      ++poses;
-      pose(poses, static_cast<float>(poses));
+      next_pose();
       real_fps = run().real_fps;
     }
   };
@@ -188,7 +186,7 @@ TEST_F(FrameLoopTest, TellsTheEncoderItsRealRate) {
   EXPECT_EQ(real_fps, 50);
 }
 
-TEST_F(FrameLoopTest, WhatALostConnectionAskedForIsForNobody) {
+TEST_F(FrameLoopTest, AFrameOfALostConnectionIsDropped) {
   pose(1, 0.0f);
   const FrameOrder old = start();
   loop.forget_started();
@@ -309,8 +307,7 @@ TEST_F(FrameLoopTest, AStillOfTheSizeOfMotionIsRefinedAgainWhateverTheEncoderFin
 
 TEST_F(RestTest, PosesThatComeSlowlyAreNone) {
   for (int i = 0; i < 40; ++i) {
-    ++poses;
-    pose(poses, static_cast<float>(poses));
+    next_pose();
     for (int ms = 0; ms < 200; ++ms, now += 1ms) {
       if (!is_due()) continue;
       const FrameOrder order = run();
@@ -342,18 +339,16 @@ TEST_F(RestTest, BeginsAtOnceWhereTheClientSaysThatNothingMoves) {
 TEST_F(RestTest, BeginsWithAPoseThatNothingMovesEvenIfTheOneBeforeWasHeldUp) {
   for (int i = 0; i < 5; ++i) moved();
   now += 17ms;
-  ++poses;
-  pose(poses, static_cast<float>(poses), true);
+  next_pose(true);
   EXPECT_TRUE(run().ticket.still);
 }
 
-TEST_F(RestTest, WhoSaysWithEveryPoseThatNothingMovesGetsNoMoreStills) {
+TEST_F(RestTest, ClaimsOfRestWithEveryPoseGiveNoMoreStills) {
   int stills = 0;
   const TimePoint begin = now;
   while (now - begin < 2s) {
     now += 20ms;
-    ++poses;
-    pose(poses, static_cast<float>(poses), true);
+    next_pose(true);
     if (is_due()) stills += run().ticket.still ? 1 : 0;
   }
   EXPECT_GT(stills, 15);

@@ -2,14 +2,10 @@
 
 #include "server/visit/picture_plan.h"
 
-#include <utility>
-
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class PicturePlanTest : public testing::Test {
  protected:

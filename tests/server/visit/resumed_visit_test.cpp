@@ -1,11 +1,10 @@
 // A session that waits for its slot, loses its client, gets it back: with a fake clock.
 
 #include "tests/server/visit/visit_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class SessionLife : public test::VisitTest {
  protected:

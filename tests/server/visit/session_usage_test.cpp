@@ -1,11 +1,9 @@
 #include "server/visit/session_usage.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST(RecentTimes, GivePercentilesOfTheLastOnes) {
   RecentTimes times;
@@ -126,7 +124,7 @@ TEST_F(SessionUsageTest, TimesOfStillsAreNoLatency) {
   EXPECT_FALSE(usage.times(SessionTime::motion_to_photon).percentiles());
 }
 
-TEST(ShareOut, ByBusyTimeAndNothingGetsLost) {
+TEST(ShareOut, FollowsBusyTimeAndLosesNothing) {
   EXPECT_EQ(share_out(6.0, {1.0, 0.0, 2.0}), (std::vector{2.0, 0.0, 4.0}));
   EXPECT_EQ(share_out(6.0, {0.0, 0.0}), (std::vector{0.0, 0.0})) << "nobody was at work";
   EXPECT_TRUE(share_out(6.0, {}).empty());

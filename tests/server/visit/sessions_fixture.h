@@ -2,20 +2,7 @@
 
 // Sessions with devices and encoders that are not there, and that fail when somebody says so.
 
-#include <algorithm>
-#include <array>
-#include <atomic>
 #include <deque>
-#include <functional>
-#include <map>
-#include <memory>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "proto/catgs.pb.h"
 #include "render_core/cuda/place_view.h"
@@ -23,10 +10,9 @@
 #include "server/frame_path.h"
 #include "server/schedule/pool_executor.h"
 #include "server/visit/sessions.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
-
-using namespace std::chrono_literals;
 
 /// A socket that is always read. Session thread only, but for queued frames.
 class OpenConnection final : public Connection {
@@ -34,6 +20,7 @@ class OpenConnection final : public Connection {
   explicit OpenConnection(std::string peer_address = "127.0.0.1")
       : peer_address_(std::move(peer_address)) {}
   void send(OutgoingMessage message) override {
+    ++messages;
     const std::vector<std::byte>& bytes = message.bytes;
     v1::ServerMessage parsed;
     if (!parsed.ParseFromArray(bytes.data() + 1, static_cast<int>(bytes.size()) - 1))
@@ -52,6 +39,7 @@ class OpenConnection final : public Connection {
     if (waits) estimate_s = parsed.queue().estimate_s();
   }
   std::vector<std::uint64_t> send(OutgoingFrame frame) override {
+    if (full) return {frame.ticket.frame_id};
     frames.push_back(frame.ticket.frame_id);
     idrs += frame.ticket.idr ? 1 : 0;
     return {};
@@ -60,6 +48,8 @@ class OpenConnection final : public Connection {
   [[nodiscard]] std::string peer_address() const override { return peer_address_; }
   [[nodiscard]] std::size_t queued_frames() const override { return 0; }
 
+  int messages = 0;
+  bool full = false;  // of frames that are not read
   std::optional<v1::Welcome> welcome;
   std::optional<v1::StreamConfig> config;  // after that of the welcome
   std::optional<v1::Error> error;

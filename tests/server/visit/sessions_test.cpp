@@ -1,12 +1,10 @@
 // Who gets which device and which encoder, and who is refused.
 
-#include <set>
-#include <sstream>
-
 #include <spdlog/spdlog.h>
 
 #include "server/base/log.h"
 #include "tests/server/visit/sessions_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
 namespace {
@@ -26,7 +24,7 @@ TEST_F(SessionsTest, NewSessionsGoWhereLessWorkIsMeasured) {
       << "by their number, one of them would be on device 0";
 }
 
-TEST_F(SessionsTest, WhereNvencDoesNotOpenX264Serves) {
+TEST_F(SessionsTest, X264ServesWhenNvencDoesNotOpen) {
   nvenc_limit = 1;
   start();
   EXPECT_EQ(encoder_of(join()), "h264_nvenc");
@@ -69,7 +67,7 @@ TEST_F(SessionsTest, AddressesOfOneNetworkOfIpv6ShareTheirLimit) {
   EXPECT_TRUE(admits("2001:db8:1:2:ffff::2"));
   ASSERT_FALSE(admits("2001:db8:1:2::3"));
   EXPECT_THAT(clients.back().connection->error->message(),
-              testing::HasSubstr("from 2001:db8:1:2::/64 already"));
+              HasSubstr("from 2001:db8:1:2::/64 already"));
   EXPECT_TRUE(admits("2001:db8:1:3::1")) << "a neighbour's";
   for (const std::size_t index : {3u, 2u, 0u}) leave(index);
   run_until([&] { return sessions->connections() == 1; });
@@ -104,7 +102,7 @@ TEST_F(SessionsTest, SessionsHaveIdsThatNoOtherServerGivesAway) {
   std::set<std::string> ids;
   for (int i = 0; i < 4; ++i) ids.insert(join().connection->welcome->session_id());
   EXPECT_EQ(ids.size(), 4u);
-  EXPECT_THAT(ids, testing::Each(testing::MatchesRegex("[0-9a-f]{32}")));
+  EXPECT_THAT(ids, Each(MatchesRegex("[0-9a-f]{32}")));
 }
 
 TEST_F(SessionsTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
@@ -259,7 +257,7 @@ TEST_F(SharedTourTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
   EXPECT_EQ(leader->connection->companies.size(), told.size());
 }
 
-TEST_F(SharedTourTest, WhoComesHearsAtOnceWhereTheOthersAre) {
+TEST_F(SharedTourTest, ANewcomerHearsAtOnceWhereTheOthersAre) {
   begin(false, true);
   move(*leader);
   run_until([&] { return !follower->connection->companies.empty(); });
@@ -274,7 +272,7 @@ TEST_F(SharedTourTest, WhoComesHearsAtOnceWhereTheOthersAre) {
   }
 }
 
-TEST_F(SharedTourTest, WhoEntersAnotherSceneLeavesIt) {
+TEST_F(SharedTourTest, AFollowerThatEntersAnotherSceneLeavesIt) {
   begin(true, true);
   move(*leader);
   move(*follower);
@@ -323,7 +321,7 @@ TEST_F(SharedTourTest, HearsThatTheLeaderIsInAnotherSceneAndFindsItThere) {
   EXPECT_EQ(again.connection->lead->state(), v1::Lead::LEADS);
 }
 
-TEST_F(SharedTourTest, WhoMayNotEnterTheLeadersSceneWatchesItAndGetsNoVisitThere) {
+TEST_F(SharedTourTest, AFollowerWithoutAccessToTheLeadersSceneOnlyWatchesIt) {
   authorize = [](const std::string& token) {
     return Permit{[narrow = token == "narrow"](std::string_view scene_id, Use) -> Refusal {
       return narrow && scene_id == "attic" ? Refusal("not yours") : std::nullopt;
@@ -369,7 +367,7 @@ TEST_F(SessionsTest, VisitorsPrepareFewScenesAndNoneThatTheyMayNotEnter) {
     say(visitor, message);
   }
   run_for(100ms);
-  EXPECT_THAT(scenes.prepared, testing::ElementsAre("hall", "attic"));
+  EXPECT_THAT(scenes.prepared, ElementsAre("hall", "attic"));
 }
 
 TEST_F(SessionsTest, StopsThatNoTourHasAreNotCounted) {

@@ -1,11 +1,10 @@
 // The picture that stays when the camera rests.
 
 #include "tests/server/visit/visit_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class StillTest : public test::VisitTest {
  protected:
@@ -34,37 +33,6 @@ class StillTest : public test::VisitTest {
   }
   std::uint64_t poses_ = 0;
 };
-
-TEST_F(StillTest, IsOfItsOwnSizeAndSoIsMotionAfterIt) {
-  greet(small_in_motion());
-  for (int i = 0; i < 5; ++i) EXPECT_EQ(moved().ticket.size_px, glm::ivec2(426, 240));
-  const FrameOrder still = rested();
-  EXPECT_TRUE(still.ticket.still);
-  EXPECT_FALSE(still.ticket.refined);
-  EXPECT_TRUE(still.force_idr);
-  EXPECT_EQ(still.ticket.size_px, glm::ivec2(1280, 720));
-  EXPECT_EQ(still.encoding.size_px, still.ticket.size_px);
-  EXPECT_EQ(still.request.camera.size_px, still.ticket.size_px);
-  ASSERT_EQ(host.count<StreamConfig>(), 1);
-  EXPECT_EQ(session.stream().config().size_px, glm::ivec2(1280, 720));
-  EXPECT_EQ(session.stream().config().fps, policy.default_fps) << "that of moving pictures";
-
-  now += 70ms;
-  ASSERT_TRUE(frame_is_due());
-  const FrameOrder refinement = shown();
-  EXPECT_TRUE(refinement.ticket.refined);
-  EXPECT_FALSE(refinement.force_idr);
-  EXPECT_EQ(refinement.ticket.size_px, still.ticket.size_px);
-
-  now += 1ms;
-  pose(++poses_, 100.0f);
-  ASSERT_TRUE(frame_is_due()) << "motion waits for no refinement";
-  const FrameOrder moving = shown();
-  EXPECT_EQ(moving.ticket.size_px, glm::ivec2(426, 240));
-  EXPECT_TRUE(moving.force_idr);
-  EXPECT_EQ(session.stream().config().size_px, glm::ivec2(426, 240));
-  EXPECT_FALSE(moved().force_idr);
-}
 
 TEST_F(StillTest, TheLadderAndWishesForMotionLeaveItAlone) {
   greet(small_in_motion());

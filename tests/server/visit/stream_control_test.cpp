@@ -2,14 +2,11 @@
 
 #include "server/visit/stream_control.h"
 
-#include <gtest/gtest.h>
-
 #include "tests/server/visit/fake_host.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 class StreamControlTest : public testing::Test {
  protected:
@@ -102,7 +99,7 @@ TEST_F(StreamControlTest, AFormThatCannotBeOpenedLeavesTheOneThatItHas) {
   EXPECT_EQ(stream.scene(), whole);
 }
 
-TEST_F(StreamControlTest, WhatIsWantedWhileItIsInUseIsOpenedAfterwards) {
+TEST_F(StreamControlTest, AStreamInUseIsReopenedAfterwards) {
   begin();
   stream.begin_frame(false, now);
   stream.enter_scene(test::named_scene("b"));
@@ -151,7 +148,7 @@ TEST_F(StreamControlTest, AnotherEffortOpensTheEncoderAnewWithoutAWord) {
   EXPECT_FALSE(make(order)) << "nothing that the client was told has changed";
 }
 
-TEST_F(StreamControlTest, WhatSharpensAStillGoesOnInItsStream) {
+TEST_F(StreamControlTest, RefinementsStayInTheStreamOfTheirStill) {
   begin();
   wish({426, 240}, {1280, 720});
   stream.plan().use_effort({.preset = 0, .threads = 2});
@@ -186,7 +183,7 @@ TEST_F(StreamControlTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
   EXPECT_FALSE(stream.opening()) << "nothing is left";
 }
 
-TEST_F(StreamControlTest, WhatCannotBeMadeSoLargeStaysAsInMotion) {
+TEST_F(StreamControlTest, AStillThatCannotBeSoLargeHasTheSizeOfMotion) {
   begin();
   wish({426, 240}, {1280, 720});
   EXPECT_TRUE(mends(Fault::encoder_unavailable, true));

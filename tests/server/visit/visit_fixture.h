@@ -2,15 +2,11 @@
 
 // A Visit with a fake clock and a fake server around it.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "server/visit/visit.h"
 #include "tests/server/visit/fake_host.h"
+#include "tests/support/test.h"
 
 namespace catgs::test {
-
-using namespace std::chrono_literals;
 
 class VisitTest : public testing::Test {
  protected:

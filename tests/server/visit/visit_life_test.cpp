@@ -2,14 +2,10 @@
 
 #include "server/visit/visit_life.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
-using testing::HasSubstr;
 
 class VisitLifeTest : public testing::Test {
  protected:

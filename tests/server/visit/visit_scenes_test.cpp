@@ -1,11 +1,11 @@
 // Scenes of a session: another one, one that is loaded first, and what a ray meets in it.
 
 #include "tests/server/visit/visit_fixture.h"
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using namespace std::chrono_literals;
 using test::VisitTest;
 
 TEST_F(VisitTest, AnotherSceneWelcomesAgain) {
@@ -95,7 +95,7 @@ TEST_F(VisitTest, TheOldSceneIsShownWhileTheNextOneIsLoaded) {
   EXPECT_EQ(std::get<Welcome>(host.said.back()).scene.scene_id, "b");
 }
 
-TEST_F(VisitTest, WhoseNextSceneFailsIsWelcomedBackToTheOldOne) {
+TEST_F(VisitTest, ASceneThatFailsLeadsBackToTheOldOne) {
   greet();
   host.scene_awaited = true;
   session.on_message(SelectScene{"b"}, now);
@@ -109,7 +109,7 @@ TEST_F(VisitTest, WhoseNextSceneFailsIsWelcomedBackToTheOldOne) {
   EXPECT_EQ(host.count<Welcome>(), 2) << "it was not waiting";
 }
 
-TEST_F(VisitTest, WhoSelectsInQuickSuccessionGetsTheLastOneWithTheNextTick) {
+TEST_F(VisitTest, QuickSelectionsGiveTheLastOneWithTheNextTick) {
   greet();
   session.on_message(SelectScene{"b"}, now);
   open_stream();
@@ -128,7 +128,7 @@ TEST_F(VisitTest, WhoSelectsInQuickSuccessionGetsTheLastOneWithTheNextTick) {
   EXPECT_EQ(session.stream().scene()->facts.scene_id, "d") << "at once";
 }
 
-TEST_F(VisitTest, WhoLooksAtAnotherSceneMeanwhileWaitsNoMore) {
+TEST_F(VisitTest, ASelectionOfAnotherSceneEndsTheWait) {
   greet();
   host.scene_awaited = true;
   session.on_message(SelectScene{"b"}, now);

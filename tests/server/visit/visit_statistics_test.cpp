@@ -2,12 +2,10 @@
 
 #include "server/visit/visit_statistics.h"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.h"
 
 namespace catgs {
 namespace {
-
-using namespace std::chrono_literals;
 
 TEST(VisitStatisticsTest, AreToldOnceASecondWhileFramesFlow) {
   TimePoint now = TimePoint{} + 1h;

@@ -8,23 +8,13 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/motion/trajectory.h"
 #include "render_core/scene/files/save_scene.h"
+#include "tests/render_core/tools/glide.h"
 #include "tests/render_core/tools/run_catgs_render.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs::test {
-
-/// A camera that glides sideways past random Gaussians at 120 Hz.
-inline Trajectory glide(std::size_t frames) {
-  Trajectory path;
-  for (std::size_t i = 0; i < frames; ++i) {
-    const auto time = static_cast<std::int64_t>(i) * 1'000'000 / 120;
-    path.push_back({time, {glm::vec3(0.004f * static_cast<float>(i), 0, 0), {1, 0, 0, 0}}});
-  }
-  return path;
-}
 
 /// `catgs-render paper` with two small scenes and a trace.
 class Paper : public ::testing::Test {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render_core/motion/trajectory.h"
+#include "tests/render_core/tools/glide.h"
 #include "tests/render_core/tools/run_catgs_render.h"
 #include "tests/support/temporary_folder.h"
 
@@ -15,19 +15,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Sideways at 0.48 units a second, 120 samples a second.
-Trajectory glide(std::size_t samples) {
-  Trajectory path;
-  for (std::size_t i = 0; i < samples; ++i) {
-    const auto time_us = static_cast<std::int64_t>(i) * 1'000'000 / 120;
-    path.push_back({time_us, {glm::vec3(0.004f * static_cast<float>(i), 0, 0), {1, 0, 0, 0}}});
-  }
-  return path;
-}
-
 class TraceWindows : public ::testing::Test {
  protected:
-  void SetUp() override { write_tum(folder_ / "glide.tum", glide(2400)); }
+  void SetUp() override { write_tum(folder_ / "glide.tum", test::glide(2400)); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
