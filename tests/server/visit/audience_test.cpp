@@ -1,6 +1,6 @@
 #include "server/visit/audience.h"
 
-#include "tests/server/visit/places_fixture.h"
+#include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
 namespace {
