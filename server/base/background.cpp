@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <semaphore>
 
 #include "server/base/log_event.h"
 #include "server/base/prompt_thread.h"
@@ -14,10 +15,9 @@ constexpr std::chrono::hours nothing_due{1};
 }  // namespace
 
 void sleep_unless_stopped(Clock::duration duration, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::condition_variable_any never;
-  std::unique_lock lock(mutex);
-  never.wait_for(lock, stop, duration, [] { return false; });
+  std::binary_semaphore stopped(0);
+  const std::stop_callback wake(stop, [&] { stopped.release(); });
+  (void)stopped.try_acquire_for(duration);
 }
 
 void Background::enqueue(LaneState& lane, const SharedJob& job) {
