@@ -138,23 +138,23 @@ ensure_scene() {
 }
 
 # An author may have moved the start, or said how long a unit is.
-has_ground() { [[ ${1%.ply}.walk -nt $1 && ${1%.ply}.walk -nt ${1%.ply}.json ]]; }
+has_walkable_area() { [[ ${1%.ply}.walk -nt $1 && ${1%.ply}.walk -nt ${1%.ply}.json ]]; }
 
-# The server takes these files. Else it would look for the ground when the first visitor asks.
-find_demo_grounds() {
+# The server takes these files. Else it would look for the area when the first visitor asks.
+find_walkable_areas() {
   local scene
   for scene in "${demo_scenes[@]}"; do
-    has_ground "$scene" || "$bin_dir/catgs-render" floors "$scene" "${scene%.ply}.walk" ||
+    has_walkable_area "$scene" || "$bin_dir/catgs-render" floors "$scene" "${scene%.ply}.walk" ||
       echo "$scene is shown, but nobody walks in it"
   done
 }
 
-ensure_grounds() {
+ensure_walkable_areas() {
   ((${#scenes[@]} == 0)) || return 0
-  if has_ground "${demo_scenes[0]}" && has_ground "${demo_scenes[1]}"; then
+  if has_walkable_area "${demo_scenes[0]}" && has_walkable_area "${demo_scenes[1]}"; then
     step_done "Where people walk in the demo scenes: already found"
   else
-    step "Find where people walk in the demo scenes" find_demo_grounds
+    step "Find where people walk in the demo scenes" find_walkable_areas
   fi
 }
 
@@ -339,7 +339,7 @@ main() {
   compose_server_command
   check_server_options
   ensure_scene
-  ensure_grounds
+  ensure_walkable_areas
   if ((lan)); then
     choose_lan_address
     step "Certificate and token for $lan_address" make_lan_credentials

@@ -9,8 +9,8 @@ usage() {
 usage: deploy/test.sh [--quick | --full] [--log FILE]
 
 Installs what the build and the tests need, builds, and runs the tests. A test that fails is tried once
-more. If that happens twice within a week, it counts as a failure: ~/.cache/catgs/unsteady-tests.json
-has the names.
+more. One that passes so twice within a week counts as failed: ~/.cache/catgs/unsteady-tests.json has
+the names. Browser tests count by group.
 
   --quick      unit, integration and lint tests only (minutes, once built)
   (default)    also the load and browser tests

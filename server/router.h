@@ -28,7 +28,7 @@ class Router {
   [[nodiscard]] std::size_t most_bytes(std::string_view path) const;
   [[nodiscard]] std::optional<HttpResponse> refuse_upload(const HttpRequest& request) const;
   [[nodiscard]] std::future<HttpResponse> take_upload(
-      const HttpRequest& request, std::string body, std::shared_ptr<const UploadPlace> place) const;
+      const HttpRequest& request, std::string body, std::shared_ptr<const UploadSlot> place) const;
 
  private:
   /// With the permit of the request's token, if the route asks for one.

@@ -11,7 +11,7 @@
 #include "server/access/authorize.h"
 #include "server/net/http.h"
 #include "server/net/path_pattern.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 
 namespace catgs {
 
@@ -28,7 +28,7 @@ struct RouteRequest {
 
 struct Upload {
   std::string body;
-  std::shared_ptr<const UploadPlace> place;
+  std::shared_ptr<const UploadSlot> place;
 };
 
 /// What a token must allow its sender to do with the scene in the path.

@@ -103,7 +103,7 @@ NetOptions Server::State::net_options() {
     return router->refuse_upload(request);
   };
   options.uploads.take = [this](const HttpRequest& request, std::string body,
-                                std::shared_ptr<const UploadPlace> place) {
+                                std::shared_ptr<const UploadSlot> place) {
     return router->take_upload(request, std::move(body), std::move(place));
   };
   options.uploads.on_full = [this] { metrics.uploads_refused.Increment(); };

@@ -77,7 +77,7 @@ HttpResponse FilmRenderer::cancel(std::string_view id) {
 
 std::future<HttpResponse> FilmRenderer::order(std::string scene_id, std::string owner,
                                               std::string json,
-                                              std::shared_ptr<const UploadPlace> place) {
+                                              std::shared_ptr<const UploadSlot> place) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
   // An order is too long to be read on the network thread.

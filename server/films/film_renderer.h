@@ -13,7 +13,7 @@
 #include "server/base/background.h"
 #include "server/films/film_queue.h"
 #include "server/net/http.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 #include "server/scenes/scene_lease.h"
 
 namespace catgs {
@@ -51,7 +51,7 @@ class FilmRenderer {
   /// sender may save the scene. `owner`: id of its token. One whose place is abandoned meanwhile
   /// orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
-                                  std::shared_ptr<const UploadPlace> place);
+                                  std::shared_ptr<const UploadSlot> place);
 
  private:
   /// Nothing: there is no such job, or its link was revoked.

@@ -12,7 +12,7 @@
 
 namespace catgs {
 
-class UploadPlace;
+class UploadSlot;
 
 enum class HttpMethod { get, put, delete_ };  // HEAD is a GET without its body
 
@@ -103,7 +103,7 @@ struct HttpUploads {
   /// Takes a complete body. Any thread may fulfil the promise; a broken promise becomes status 503.
   /// The body's owner also holds `place` and may drop both when the place is abandoned.
   std::function<std::future<HttpResponse>(const HttpRequest&, std::string body,
-                                          std::shared_ptr<const UploadPlace> place)>
+                                          std::shared_ptr<const UploadSlot> place)>
       take;
   /// Called when an upload finds no free place.
   std::function<void()> on_full = [] {};

@@ -60,7 +60,7 @@ int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
   if (auto refusal = refuse_upload(wsi))
     return large ? exchange.refuse_body(wsi, *std::move(refusal), service.scratch)
                  : exchange.begin_refused_upload(wsi, *std::move(refusal));
-  UploadPlaces& places = large ? service.large_uploads : service.uploads;
+  UploadSlots& places = large ? service.large_uploads : service.uploads;
   const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   if (auto place = places.take(link, limited_as(client_address_of(wsi))))
     return exchange.begin_upload(wsi, place, bytes);

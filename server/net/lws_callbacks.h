@@ -13,7 +13,7 @@
 #include "server/net/answered_connections.h"
 #include "server/net/disk_jobs.h"
 #include "server/net/lws_websocket.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 
 namespace catgs {
 
@@ -34,8 +34,8 @@ struct Service {
   int callbacks = 0;  // in this round of the service loop
   RateLimit idle_rounds{idle_rounds_per_second, idle_round_burst,
                         Clock::now()};  // rounds without a callback
-  UploadPlaces uploads{UploadPlaces::small};
-  UploadPlaces large_uploads{UploadPlaces::large};
+  UploadSlots uploads{UploadSlots::small};
+  UploadSlots large_uploads{UploadSlots::large};
   DiskJobs disk;
 };
 

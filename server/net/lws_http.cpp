@@ -150,7 +150,7 @@ LwsHttpExchange::~LwsHttpExchange() {
   if (place_) place_->abandon();
 }
 
-int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place, std::size_t bytes) {
+int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadSlot> place, std::size_t bytes) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
   authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),

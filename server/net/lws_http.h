@@ -14,7 +14,7 @@
 #include "server/net/body_deadline.h"
 #include "server/net/disk_jobs.h"
 #include "server/net/http.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 
 namespace catgs {
 
@@ -32,7 +32,7 @@ class LwsHttpExchange {
   /// threads. `site`: HttpRequest::site.
   int begin(lws* wsi, const HttpHandler& handler, const std::string& site);
   /// Accepts a PUT request. Its body of so many bytes is kept in `place`.
-  int begin_upload(lws* wsi, std::shared_ptr<UploadPlace> place, std::size_t bytes);
+  int begin_upload(lws* wsi, std::shared_ptr<UploadSlot> place, std::size_t bytes);
   /// Refuses a PUT request after its body has arrived. The body is dropped.
   int begin_refused_upload(lws* wsi, HttpResponse refusal);
   /// Refuses a PUT request at once. The rest of the body is read and dropped, within bounds:
@@ -85,7 +85,7 @@ class LwsHttpExchange {
   std::string path_;
   std::string authorization_;
   Precondition precondition_;
-  std::shared_ptr<UploadPlace> place_;
+  std::shared_ptr<UploadSlot> place_;
   std::size_t announced_bytes_ = 0;
   std::string body_;
   std::optional<HttpResponse> refusal_;

@@ -153,7 +153,7 @@ std::optional<HttpResponse> MediaApi::refuse_upload(const std::string& scene_id,
 
 std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::string& scene_id,
                                          std::string name, std::string content,
-                                         std::shared_ptr<const UploadPlace> place) {
+                                         std::shared_ptr<const UploadSlot> place) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
   const auto folder = folder_of(scene_id);
@@ -164,7 +164,7 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::
   const auto write = [folder = *folder, scene_id, name = std::move(name),
                       precondition = Precondition{std::string(request.if_match),
                                                   std::string(request.if_none_match)}](
-                         std::string_view bytes, const UploadPlace& of_sender) {
+                         std::string_view bytes, const UploadSlot& of_sender) {
     try {
       const auto may_replace = [&](const std::string& etag) { return precondition.holds(etag); };
       if (!folder.save(name, bytes, may_replace, [&] { return !of_sender.abandoned(); }))

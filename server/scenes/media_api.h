@@ -13,7 +13,7 @@
 #include "server/base/background.h"
 #include "server/media/media_folder.h"
 #include "server/net/http.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 #include "server/scenes/scene_library.h"
 
 namespace catgs {
@@ -46,7 +46,7 @@ class MediaApi {
   /// Adds or replaces a file. See HttpUploads::take.
   std::future<HttpResponse> save(const HttpRequest& request, const std::string& scene_id,
                                  std::string name, std::string content,
-                                 std::shared_ptr<const UploadPlace> place);
+                                 std::shared_ptr<const UploadSlot> place);
 
  private:
   /// The folder of a scene in memory; nothing: the scene is not, or it is no file.

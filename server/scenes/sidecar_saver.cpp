@@ -51,7 +51,7 @@ SidecarSaver::Request::~Request() {
 
 std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json,
                                              Precondition precondition,
-                                             std::shared_ptr<const UploadPlace> place) {
+                                             std::shared_ptr<const UploadSlot> place) {
   const auto request = std::make_shared<Request>();
   request->scene_id = std::move(scene_id);
   request->json = std::move(json);

@@ -13,7 +13,7 @@
 
 #include "server/base/background.h"
 #include "server/net/http.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 #include "server/scenes/scene_library.h"
 
 namespace catgs {
@@ -35,7 +35,7 @@ class SidecarSaver {
   /// that share a folder look at the sidecar and replace it one after the other. Requests run one
   /// after the other, too; one with an abandoned place is dropped.
   std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition,
-                                 std::shared_ptr<const UploadPlace> place);
+                                 std::shared_ptr<const UploadSlot> place);
 
   /// Removes what killed servers have left in these folders and in the media folders there.
   void remove_stale_files_in(std::set<std::filesystem::path> folders);
@@ -50,7 +50,7 @@ class SidecarSaver {
     std::string scene_id{};
     std::string json{};
     Precondition precondition{};
-    std::shared_ptr<const UploadPlace> place{};
+    std::shared_ptr<const UploadSlot> place{};
     std::shared_ptr<const SceneEntry> entry{};
     std::promise<HttpResponse> promise{};
     HttpResponse answer = busy_response("503: the server stops\n");

@@ -69,7 +69,7 @@ describe('a visitor who walks', () => {
       await page.waitForTimeout(250);
       const now = await pose_of(page);
       expect(Math.abs(height(now) - eye_m)).toBeLessThan(0.8);
-      if (distance(before, now) < 1e-3 && k > 2) break;
+      if (distance(before, now) < 1e-3 && k > 5) break;
       before = now;
     }
     await page.keyboard.up('KeyD');

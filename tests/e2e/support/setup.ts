@@ -6,7 +6,10 @@ import { begin_test, end_file, end_test } from './clean_up';
 process.env['TMPDIR'] = inject('scratch');
 beforeEach(begin_test);
 afterEach(async ({ task }) => {
-  await give_back_pages(task.result?.state !== 'fail');
-  await end_test();
+  try {
+    await give_back_pages(task.result?.state !== 'fail');
+  } finally {
+    await end_test();
+  }
 });
 afterAll(end_file);

@@ -39,7 +39,7 @@ class FilmRendererTest : public testing::Test {
         longest_wait});
   }
   std::string order(const std::string& json, const std::string& owner = "ada") {
-    auto answer = films->order("hall", owner, json, std::make_shared<UploadPlace>());
+    auto answer = films->order("hall", owner, json, std::make_shared<UploadSlot>());
     return nlohmann::json::parse(*answer.get().body).at("id");
   }
   nlohmann::json report(const std::string& job) {

@@ -7,7 +7,7 @@
 #include "render_core/synth/synth.h"
 #include "server/access/access.h"
 #include "server/base/scene_id.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 #include "tests/support/raw_socket.h"
 #include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
@@ -115,7 +115,7 @@ TEST_F(Films, StrangersFindNoJobAndTakeNoSlot) {
   for (const char* path : {"/api/films/guess", "/api/films/guess/file"})
     EXPECT_EQ(http_get(server->port(), path).status, 404) << path;
   std::vector<RawSocket> strangers;
-  for (std::size_t i = 0; i < 2 * UploadPlaces::small.all; ++i) {
+  for (std::size_t i = 0; i < 2 * UploadSlots::small.all; ++i) {
     strangers.emplace_back(server->port());
     strangers.back().send(
         "PUT /api/films/guess/cancel HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n");

@@ -249,7 +249,7 @@ TEST(Server, SaysThatNobodyWalksWithoutAWord) {
 }
 
 TEST(Server, FindsWherePeopleWalkWhenAPageAsks) {
-  const RunningServer& server = shared_server();
+  const RunningServer server;
   const auto ask = [&](const std::map<std::string, std::string>& headers = {}) {
     return http_get(server.port(), "/api/scenes/city/walk", headers);
   };

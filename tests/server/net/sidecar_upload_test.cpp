@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "server/access/access.h"
 #include "server/net/http.h"
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 #include "tests/server/net/own_scene_fixture.h"
 #include "tests/support/raw_socket.h"
 
@@ -50,7 +51,7 @@ class SidecarUpload : public OwnSceneTest {
   }
 
   const std::filesystem::path file = *folder / (hall + ".json");
-  const std::string author = make_link("author");
+  const std::string author = make_link("author", "", new_link_id());  // slots are counted by link
 };
 
 TEST_F(SidecarUpload, IsInForceForTheNextVisitor) {
@@ -192,16 +193,14 @@ TEST_F(SidecarUpload, SaysWhereNothingCanBeWrittenAndNamesNoFolder) {
                                 Not(HasSubstr(folder->path().string()))));
 }
 
-TEST_F(SidecarUpload, BeyondItsPlacesIsToldToComeAgain) {
-  // The slot of an earlier test may be freed a little later, so the links are those of this test.
-  const std::string author = make_link("author", "", "11");
+TEST_F(SidecarUpload, BeyondItsSlotsIsAskedToComeAgain) {
   std::vector<RawSocket> slow;  // who sends everything but the end
   const auto begin = [&](const std::string& by) {
     slow.emplace_back(server->port());
     slow.back().send(head(by, sidecar.size()) + std::string(sidecar.substr(1)));
   };
   const std::string others[] = {make_link("author", "", "22"), make_link("author", "", "33")};
-  for (std::size_t i = 0; i < UploadPlaces::small.of_a_link; ++i) begin(author);
+  for (std::size_t i = 0; i < UploadSlots::small.of_a_link; ++i) begin(author);
   ASSERT_TRUE(eventually([&] { return put(author).status == 503; }));
   const HttpReply refused = put(author);
   EXPECT_EQ(refused.headers.at("retry-after"), "1");
@@ -229,16 +228,14 @@ TEST_F(SidecarUpload, IsNotSavedWhenItsAuthorHasGone) {
 }
 
 TEST_F(SidecarUpload, UnderWayWhenTheServerStopsIsAnswered) {
-  const std::string author = make_link("author", "", "44");
   std::vector<RawSocket> late;
-  for (std::size_t i = 0; i < UploadPlaces::small.of_a_link; ++i) {
+  for (std::size_t i = 0; i < UploadSlots::small.of_a_link; ++i) {
     late.emplace_back(server->port());
     late.back().send(head(author, sidecar.size()) + std::string(sidecar.substr(0, 9)));
   }
-  ASSERT_TRUE(eventually([&] { return put(author).status == 503; })) << "they are there";
-  const bool saved_before = std::filesystem::exists(file);
+  ASSERT_TRUE(eventually([&] { return put(author, {}, "{").status == 503; })) << "they are there";
   server->stop();
-  bool saved = saved_before;
+  bool saved = false;
   for (RawSocket& one : late) {
     one.send(sidecar.substr(9));
     std::string answer;

@@ -71,12 +71,12 @@ class SidecarSaverTest : public FolderTest {
   std::string hall_;                                      // the scene's id
   std::shared_ptr<const SceneEntry> scene_;               // before any save
   std::set<std::shared_ptr<const std::string>> posters_;  // that visitors got
-  std::shared_ptr<UploadPlace> place_ = std::make_shared<UploadPlace>();
+  std::shared_ptr<UploadSlot> place_ = std::make_shared<UploadSlot>();
 };
 
 TEST_F(SidecarSaverTest, AnAbandonedUploadIsNotSaved) {
-  const auto place = std::make_shared<UploadPlace>();
-  const std::weak_ptr<const UploadPlace> held = place;
+  const auto place = std::make_shared<UploadSlot>();
+  const std::weak_ptr<const UploadSlot> held = place;
   Saved gone = saver_->save(hall_, sidecar_at(1), {}, place);
   Saved stays = save(sidecar_at(2), "*");
   place->abandon();

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using Ground = std::shared_ptr<const WalkableArea>;
+using SharedArea = std::shared_ptr<const WalkableArea>;
 
 constexpr auto sidecar =
     R"({"up": [0, 0, 1], "start_pose": {"position": [2, 2, 1.6], "look_at": [2, 5, 1.6]}, "metres_per_unit": 1})";
@@ -41,9 +41,9 @@ class WalkableAreasTest : public LibraryTest {
   }
   std::string id() const { return LibraryTest::id("a"); }
   Entry load() { return visit("a"); }
-  Ground listed() const { return LibraryTest::listed("a").walkable_area; }
+  SharedArea listed() const { return LibraryTest::listed("a").walkable_area; }
   /// As a page does that asks again and again.
-  Ground found() {
+  SharedArea found() {
     run_until([&] {
       library_->want_walkable_area(id());
       return listed() != nullptr;
@@ -58,12 +58,12 @@ class WalkableAreasTest : public LibraryTest {
   }
 };
 
-TEST_F(WalkableAreasTest, AScenesGroundIsFoundWhenAPageAsks) {
+TEST_F(WalkableAreasTest, AScenesAreaIsFoundWhenAPageAsks) {
   start();
   library_->want_walkable_area(id());  // not in memory
   const Entry seen = load();
   EXPECT_EQ(listed(), nullptr);
-  const Ground walkable_area = found();
+  const SharedArea walkable_area = found();
   ASSERT_NE(walkable_area->file, nullptr);
   EXPECT_EQ(walkable_area->etag, etag_of(*walkable_area->file));
   const walk::WalkMap map = map_in(*walkable_area->file);
@@ -103,7 +103,7 @@ TEST_F(WalkableAreasTest, APipeInPlaceOfAFileIsReplaced) {
   ASSERT_EQ(::mkfifo((folder_ / "scenes/a.walk").c_str(), 0600), 0);  // in place of the author's
   start();
   load();
-  const Ground walkable_area = found();
+  const SharedArea walkable_area = found();
   ASSERT_TRUE(fs::is_regular_file(file));
   EXPECT_EQ(bytes_in(file), *walkable_area->file);
 }
@@ -126,7 +126,7 @@ TEST_F(WalkableAreasTest, ABadFileOfTheAuthorsIsNoHarm) {
   }
 }
 
-TEST_F(WalkableAreasTest, ASceneWithoutGroundIsLookedThroughOnce) {
+TEST_F(WalkableAreasTest, ASceneWithoutAnAreaIsSearchedOnce) {
   save_scene(random_cloud(300, 0), folder_ / "scenes/a.ply");
   start();
   load();
@@ -145,10 +145,10 @@ TEST_F(WalkableAreasTest, StaysWithItsSceneWhenThereIsNoFolder) {
   EXPECT_NE(found()->file, nullptr);
 }
 
-TEST_F(WalkableAreasTest, AnotherStartHasAnotherGround) {
+TEST_F(WalkableAreasTest, AnotherStartHasAnotherArea) {
   start();
   const Entry seen = load();
-  const Ground before = found();
+  const SharedArea before = found();
   auto turned = std::make_shared<SceneEntry>(*seen);
   turned->facts.about.title = "Another title";
   library_->revise(id(), turned);
@@ -161,7 +161,7 @@ TEST_F(WalkableAreasTest, AnotherStartHasAnotherGround) {
   EXPECT_EQ(kept().size(), 2u);
 }
 
-TEST_F(WalkableAreasTest, AChangedSceneGetsItsOwnGround) {
+TEST_F(WalkableAreasTest, AChangedSceneGetsItsOwnArea) {
   start();
   Entry seen = load();
   found();
@@ -181,7 +181,7 @@ TEST_F(WalkableAreasTest, ATreeIsReadPartByPart) {
   start();
   load();
   run_until([&] { return library_->in_memory(id())->in_pages; });
-  const Ground walkable_area = found();
+  const SharedArea walkable_area = found();
   ASSERT_NE(walkable_area->file, nullptr);
   EXPECT_TRUE(walk::stand_below(map_in(*walkable_area->file), {6, 3, 2}));
 }
@@ -210,7 +210,7 @@ TEST_F(WalkableAreasTest, AFailureThatPassesIsNoAnswer) {
   EXPECT_NE(listed()->file, nullptr);
 }
 
-TEST_F(WalkableAreasTest, TheLibraryEndsWhileAGroundIsSought) {
+TEST_F(WalkableAreasTest, TheLibraryEndsDuringASearch) {
   start();
   load();
   library_->want_walkable_area(id());

@@ -56,7 +56,7 @@ TEST(AdmissionBudget, CountsThoseNotMeasuredYet) {
             Room::no);
 }
 
-TEST(AdmissionBudget, AWishForManyPixelsKeepsNobodyOut) {
+TEST(AdmissionBudget, ARequestForManyPixelsKeepsNobodyOut) {
   const AdmissionBudget budget({.cpus = 2}, 10);
   const std::vector present{session(0.02, 0.0, 0.004)};
   for (const double megapixels : {0.3, 2.0, 8.3, 33.0}) {

@@ -24,7 +24,7 @@ class PicturePlanTest : public testing::Test {
   PicturePlan plan{policy, flow};
 };
 
-TEST_F(PicturePlanTest, WishesEndAtThePolicy) {
+TEST_F(PicturePlanTest, RequestsEndAtThePolicy) {
   const auto wish = [&](glm::ivec2 size_px, int kbps) {
     return wish_within(policy, {.size_px = size_px, .max_bitrate_kbps = kbps}, {640, 360});
   };

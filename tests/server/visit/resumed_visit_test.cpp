@@ -135,7 +135,7 @@ TEST_F(SessionLife, AFrameOfTheLostConnectionNeverReachesTheNewOne) {
   EXPECT_EQ(host.frames.size(), 1u);
 }
 
-TEST_F(SessionLife, TakesTheWishesOfTheResumingHello) {
+TEST_F(SessionLife, TakesTheRequestsOfTheResumingHello) {
   greet();
   pose(5, 0.0f);
   ack(run_frame().ticket.frame_id);

@@ -120,7 +120,7 @@ TEST_F(SessionsTest, APictureAtRestIsDrawnAgainWhenPagesCome) {
   run_until([&] { return drawn() > before; });
 }
 
-TEST_F(SessionsTest, RefusesConnectionsBeyondAllPlaces) {
+TEST_F(SessionsTest, RefusesConnectionsBeyondAllSlots) {
   options.max_sessions = 2;
   options.max_spectators = 3;
   options.max_queue = 4;

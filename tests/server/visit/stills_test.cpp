@@ -48,7 +48,7 @@ TEST_F(StillTest, TheLadderAndWishesForMotionLeaveItAlone) {
   EXPECT_EQ(moved().ticket.size_px, glm::ivec2(640, 360));
 }
 
-TEST_F(StillTest, FollowsTheVisitorsWish) {
+TEST_F(StillTest, FollowsTheVisitorsRequest) {
   greet(small_in_motion());
   sharp = true;
   moved();

@@ -1,45 +1,45 @@
-#include "server/net/upload_places.h"
+#include "server/net/upload_slots.h"
 
 #include "tests/support/test.h"
 
 namespace catgs {
 namespace {
 
-using Held = std::vector<std::shared_ptr<UploadPlace>>;
+using Held = std::vector<std::shared_ptr<UploadSlot>>;
 
-TEST(UploadPlaces, AreAFewAndFreeAgainWhenNobodyHoldsThem) {
-  UploadPlaces places(UploadPlaces::small);
+TEST(UploadSlots, AreAFewAndFreeAgainWhenNobodyHoldsThem) {
+  UploadSlots places(UploadSlots::small);
   Held held;
-  for (std::size_t i = 0; i < UploadPlaces::small.all; ++i)
+  for (std::size_t i = 0; i < UploadSlots::small.all; ++i)
     held.push_back(places.take("link " + std::to_string(i), "address " + std::to_string(i)));
-  EXPECT_EQ(places.taken(), UploadPlaces::small.all);
+  EXPECT_EQ(places.taken(), UploadSlots::small.all);
   EXPECT_EQ(places.take("one more", "elsewhere"), nullptr);
-  const std::shared_ptr<const UploadPlace> saver = held.back();
+  const std::shared_ptr<const UploadSlot> saver = held.back();
   held.back()->abandon();
   held.pop_back();
   EXPECT_EQ(places.take("one more", "elsewhere"), nullptr) << "its body is still in memory";
   EXPECT_TRUE(saver->abandoned());
   held.pop_back();
-  EXPECT_EQ(places.taken(), UploadPlaces::small.all - 1);
+  EXPECT_EQ(places.taken(), UploadSlots::small.all - 1);
   const auto place = places.take("one more", "elsewhere");
   ASSERT_TRUE(place);
   EXPECT_FALSE(place->abandoned());
 }
 
-TEST(UploadPlaces, OneLinkLeavesSomeToOthers) {
-  UploadPlaces places(UploadPlaces::small);
+TEST(UploadSlots, OneLinkLeavesSomeToOthers) {
+  UploadSlots places(UploadSlots::small);
   Held held;
   while (auto place = places.take("greedy", std::to_string(held.size())))
     held.push_back(std::move(place));
-  EXPECT_EQ(held.size(), UploadPlaces::small.of_a_link);
+  EXPECT_EQ(held.size(), UploadSlots::small.of_a_link);
   EXPECT_TRUE(places.take("another", "elsewhere"));
   held.pop_back();
   EXPECT_TRUE(places.take("greedy", "elsewhere"));
 }
 
-TEST(UploadPlaces, OneAddressLeavesSomeToOthers) {
-  for (const UploadPlaces::Bounds& bounds : {UploadPlaces::small, UploadPlaces::large}) {
-    UploadPlaces places(bounds);
+TEST(UploadSlots, OneAddressLeavesSomeToOthers) {
+  for (const UploadSlots::Bounds& bounds : {UploadSlots::small, UploadSlots::large}) {
+    UploadSlots places(bounds);
     Held held;
     while (auto place = places.take(std::to_string(held.size()), "greedy"))
       held.push_back(std::move(place));
@@ -49,8 +49,8 @@ TEST(UploadPlaces, OneAddressLeavesSomeToOthers) {
   }
 }
 
-TEST(UploadPlaces, LargeBodiesHaveFewer) {
-  UploadPlaces places(UploadPlaces::large);
+TEST(UploadSlots, LargeBodiesHaveFewer) {
+  UploadSlots places(UploadSlots::large);
   const auto first = places.take("greedy", "here");
   EXPECT_TRUE(first);
   EXPECT_FALSE(places.take("greedy", "elsewhere"));

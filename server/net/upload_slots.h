@@ -10,7 +10,7 @@
 namespace catgs {
 
 /// One upload's place, held by its connection and by everything that keeps the body in memory.
-class UploadPlace {
+class UploadSlot {
  public:
   /// The connection was closed, so nobody waits for the answer any more.
   void abandon() { abandoned_ = true; }
@@ -21,7 +21,7 @@ class UploadPlace {
 };
 
 /// Bounds the uploads in memory. A place is free again when its last holder is gone. Thread-safe.
-class UploadPlaces {
+class UploadSlots {
  public:
   struct Bounds {
     std::size_t all;
@@ -31,17 +31,17 @@ class UploadPlaces {
   static constexpr Bounds small{4, 2, 3};
   static constexpr Bounds large{2, 1, 1};  // for bodies of more than max_upload_bytes
 
-  explicit UploadPlaces(const Bounds& bounds) : bounds_(bounds) {}
+  explicit UploadSlots(const Bounds& bounds) : bounds_(bounds) {}
 
   /// Returns null if no place is free. `link` is the sender's Authorization header.
-  std::shared_ptr<UploadPlace> take(const std::string& link, const std::string& address);
+  std::shared_ptr<UploadSlot> take(const std::string& link, const std::string& address);
   [[nodiscard]] std::size_t taken() const;
 
  private:
   struct Taken {
     std::string link;
     std::string address;
-    std::weak_ptr<const UploadPlace> place;
+    std::weak_ptr<const UploadSlot> place;
   };
 
   const Bounds bounds_;
