@@ -77,7 +77,7 @@ struct Server::State {
   Metrics metrics;
   const StaticFiles client;
   std::atomic<bool> ready{false};
-  const std::shared_ptr<Background> background = std::make_shared<Background>();
+  const std::shared_ptr<Background> background = std::make_shared<Background>(lanes::all);
   NetServer net;
   boost::asio::io_context io{1};  // outlives the pool of the core, whose tasks post to it
   RendererOptions core;           // all scenes' Views are counted in one set of devices

@@ -18,8 +18,9 @@ void add_missing_benchmarks(CLI::App& app) {
     command->prefix_command();  // its options are as unknown as itself
     command->group("Commands that measure, for builds with -DCATGS_BENCHMARKS=ON");
     command->callback([name] {
-      throw InputError(name, "", "is not in this build of catgs-render",
-                       "add it with: cmake build/run -DCATGS_BENCHMARKS=ON && ninja -C build/run");
+      throw InputError(
+          name, "", "is not in this build of catgs-render",
+          "set -DCATGS_BENCHMARKS=ON in its build folder, with cmake, and build again");
     });
   }
 }

@@ -20,15 +20,26 @@ void sleep_unless_stopped(Clock::duration duration, const std::stop_token& stop)
   (void)stopped.try_acquire_for(duration);
 }
 
+Background::Background(std::span<const Lane> lanes) {
+  const std::lock_guard lock(mutex_);
+  for (const Lane& lane : lanes) {
+    LaneState& state = lanes_.try_emplace(lane.name, lane).first->second;
+    while (state.threads.size() < lane.threads) start_thread(state);
+  }
+}
+
+void Background::start_thread(LaneState& lane) {
+  lane.threads.emplace_back([this, &lane](const std::stop_token& stop) { serve(lane, stop); });
+}
+
 void Background::enqueue(LaneState& lane, const SharedJob& job) {
+  const std::size_t known = lane.running.size() + lane.waiting.size() + 1;
+  if (lane.threads.size() < std::min(lane.lane.threads, known)) start_thread(lane);  // may throw
   const auto behind = std::ranges::find_if(
       lane.waiting, [&](const SharedJob& other) { return other->priority < job->priority; });
   lane.waiting.insert(behind, job);
   ++lane.changes;
   lane.changed.notify_all();
-  const std::size_t known = lane.running.size() + lane.waiting.size();
-  if (lane.threads.size() < std::min(lane.lane.threads, known))
-    lane.threads.emplace_back([this, &lane](const std::stop_token& stop) { serve(lane, stop); });
   if (job->priority == Priority::low || lane.running.size() < lane.lane.threads) return;
   const auto low = std::ranges::find(lane.running, Priority::low, &Job::priority);
   if (low != lane.running.end()) (*low)->stop.request_stop();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -41,6 +43,8 @@ inline constexpr Lane sidecars{"sidecars"};  // authors' saves
 inline constexpr Lane trees{"trees", 1, true};
 inline constexpr Lane visit_counts{"visit counts"};
 inline constexpr Lane walkable_areas{"walkable areas", 1, true};
+inline constexpr std::array all{disk,     film_requests, films,        media,         scenes,
+                                sidecars, trees,         visit_counts, walkable_areas};
 }  // namespace lanes
 
 /// Within a lane. A low job under way is stopped when a higher one waits, and starts anew later.
@@ -62,10 +66,14 @@ struct Finished {
   std::string error{};
 };
 
-/// Runs all work of the server that may take long, on few threads for each lane. A lane's threads
-/// start with its first jobs. Thread-safe. It outlives all Jobs.
+/// Runs all work of the server that may take long, on few threads for each lane. Thread-safe. It
+/// outlives all Jobs.
 class Background {
  public:
+  /// Starts the threads of these lanes; those of others start with their first jobs. A server
+  /// starts all before it runs, so that none inherits the scheduling of a prompt thread.
+  explicit Background(std::span<const Lane> lanes = {});
+
   /// Returns after how long it is to run again; nothing: it is done. Exceptions are logged.
   using Work = std::function<std::optional<Clock::duration>(const std::stop_token& stop)>;
   using JobId = std::uint64_t;  // 0: none
@@ -99,6 +107,7 @@ class Background {
   };
 
   // The mutex is held.
+  void start_thread(LaneState& lane);
   void enqueue(LaneState& lane, const SharedJob& job);
   SharedJob take(LaneState& lane);
 
@@ -121,8 +130,9 @@ class Background::Jobs {
   Jobs(const Jobs&) = delete;
   Jobs& operator=(const Jobs&) = delete;
 
-  /// `work(stop)` is Work, or returns nothing. `on_cancelled` is called instead of it, or after it.
-  /// 0: too many wait, and the job is cancelled, or close() was called.
+  /// `work(stop)` is Work, or returns nothing. `on_cancelled` is called where cancel() or a full
+  /// lane kept the work from its end, and not for what close() drops. 0: too many wait, and the job
+  /// is cancelled, or close() was called.
   template <typename Function>
   JobId start(const Lane& lane, Priority priority, Function work,
               std::function<void()> on_cancelled = {}) {
@@ -139,7 +149,7 @@ class Background::Jobs {
     }
   }
   /// Then calls `then(Finished)` with what `work(stop)` returned, on the session thread, unless the
-  /// owner is gone.
+  /// owner is gone or has closed its jobs.
   template <typename Function, typename Then>
   JobId start_then(const Lane& lane, Priority priority, Function work, Then then) {
     using Result = std::invoke_result_t<Function&, const std::stop_token&>;

@@ -201,8 +201,8 @@ std::vector<Setting> scene_settings() {
              "there are any. 0: no bound, and 4 GiB for these pages",
              &C::scene_memory_mb, 0, 10'000'000),
       text("cache-dir", "DIR",
-           "Folder in which the server keeps trees of large scenes, which it builds itself; empty: "
-           "it builds none",
+           "Folder in which the server keeps trees of large scenes, walkable areas and posters; "
+           "empty: it keeps none",
            &C::cache_dir),
       number("detail", "PX",
              "Scenes in a .tree: largest error that is drawn, pixels; 0: every Gaussian",

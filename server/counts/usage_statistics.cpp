@@ -87,7 +87,12 @@ UsageStatistics::UsageStatistics(fs::path folder, VisitCounts& counts, Backgroun
   drop_old_days();
   jobs_.start(lanes::visit_counts, Priority::normal,
               [this, save_interval, waited = false](const std::stop_token&) mutable {
-                if (std::exchange(waited, true)) save();
+                if (std::exchange(waited, true)) try {
+                    save();
+                  } catch (const std::exception& failure) {
+                    log_warning({.event = "visit_counts_unwritten"}, "visits are not saved: {}",
+                                failure.what());
+                  }
                 return std::optional<Clock::duration>(save_interval);
               });
 }

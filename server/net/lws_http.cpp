@@ -232,7 +232,7 @@ int LwsHttpExchange::answer_now(lws* wsi) {
   try {
     return answer(wsi, answer_.get());
   } catch (const std::future_error&) {
-    return answer(wsi, busy_response("503: the server stops\n"));
+    return answer(wsi, busy_response("503: the server cannot do it now: try again in a moment\n"));
   }
 }
 

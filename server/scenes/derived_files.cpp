@@ -184,7 +184,8 @@ std::optional<std::string> DerivedFiles::read(const std::string& name, std::size
   }
 }
 
-void DerivedFiles::write(const std::string& name, const std::string& bytes) const {
+void DerivedFiles::write(const std::string& name, const std::string& bytes,
+                         std::size_t most) const {
   const fs::path extension = fs::path(name).extension();
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   std::error_code error;
@@ -200,7 +201,7 @@ void DerivedFiles::write(const std::string& name, const std::string& bytes) cons
   for (const auto& [used, file] : files) {
     const bool of_this_scene = scene_part(file.filename().string()) == scene_part(name);
     const bool too_many = of_this_scene && ++of_scene > most_small_files_of_scene;
-    if (too_many || ++kept > most_small_files) fs::remove(file, error);
+    if (too_many || ++kept > most) fs::remove(file, error);
   }
   try {
     overwrite_file(path_of(name), bytes, "make room in --cache-dir");

@@ -28,7 +28,8 @@ std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 /// small files.
 class DerivedFiles {
  public:
-  static constexpr std::size_t most_small_files = 256;         // of a kind
+  static constexpr std::size_t most_walkable_areas = 256;
+  static constexpr std::size_t most_posters = 10'000;          // about 1 GB
   static constexpr std::size_t most_small_files_of_scene = 4;  // as authors save it again and again
 
   /// Makes the folder if needed, and removes what builds that were killed and earlier versions have
@@ -54,9 +55,9 @@ class DerivedFiles {
   /// damaged and is removed. Any thread.
   [[nodiscard]] std::optional<std::string> read(const std::string& name, std::size_t most_bytes,
                                                 const Check& check) const;
-  /// Writes a small file. Those of its kind that were used last stay, but a few of one scene. Any
-  /// thread.
-  void write(const std::string& name, const std::string& bytes) const;
+  /// Writes a small file. The `most` of its kind that were used last stay, but a few of one scene.
+  /// Any thread.
+  void write(const std::string& name, const std::string& bytes, std::size_t most) const;
 
  private:
   const std::filesystem::path folder_;

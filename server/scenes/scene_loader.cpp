@@ -19,12 +19,22 @@ namespace {
 
 constexpr std::size_t most_poster_bytes = 1 << 20;  // in --cache-dir
 
+/// By all that a poster shows: the scene's files and levels, and what decides where visits begin.
 /// Throws InputError.
-std::string poster_name(const SceneLocation& scene, const LoadOptions& levels) {
+std::string poster_name(const FoundScene& found, const SceneRepresentation& representation,
+                        const ServerConfig& config) {
   constexpr int version = 1;  // of how posters are drawn
-  const std::string sidecar = sidecar_text(scene.hints.sidecar).value_or("");
-  return derived_name(scene, fmt::format("{}\n{}\n{}", tree_name(scene, levels), version, sidecar),
-                      ".jpg");
+  const SceneLocation& scene = found.location;
+  std::string facts = fmt::format(
+      "{}\n{} {} {}\n{}", found.tree.empty() ? tree_name(scene, chosen_levels(config)) : found.tree,
+      version, config.up, representation.most_gaussians,
+      sidecar_text(scene.hints.sidecar).value_or(""));
+  for (const auto& file : {scene.hints.cameras, scene.hints.transforms}) {
+    std::error_code none;
+    const auto written = std::filesystem::last_write_time(file, none);
+    facts += fmt::format("\n{}", none ? 0 : written.time_since_epoch().count());
+  }
+  return derived_name(scene, facts, ".jpg");
 }
 
 void check_jpeg(const ByteSource& file) {
@@ -125,12 +135,12 @@ void SceneLoader::load_poster(const FoundScene& found, const SceneRepresentation
 SceneLoader::Poster SceneLoader::poster_of(const FoundScene& found,
                                            const SceneRepresentation& representation,
                                            const std::stop_token& stop) const {
-  const std::string name = files_ ? poster_name(found.location, chosen_levels(config_)) : "";
+  const std::string name = files_ ? poster_name(found, representation, config_) : "";
   if (auto kept = files_ ? files_->read(name, most_poster_bytes, check_jpeg) : std::nullopt)
     return std::make_shared<const std::string>(*std::move(kept));
   const LoadedScene loaded = load_on(found, representation, stop);
   const Poster poster = loaded.entry ? loaded.entry->poster : nullptr;
-  if (files_ && poster) files_->write(name, *poster);
+  if (files_ && poster) files_->write(name, *poster, DerivedFiles::most_posters);
   return poster;
 }
 

@@ -53,7 +53,8 @@ class SidecarSaver {
     std::shared_ptr<const UploadSlot> place{};
     std::shared_ptr<const SceneEntry> entry{};
     std::promise<HttpResponse> promise{};
-    HttpResponse answer = busy_response("503: the server stops\n");
+    HttpResponse answer =
+        busy_response("503: the server cannot do it now: try again in a moment\n");
   };
   struct Outcome {
     HttpResponse answer;

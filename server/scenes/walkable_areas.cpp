@@ -85,7 +85,7 @@ std::string WalkableAreas::kept_or_computed(const std::string& scene_id,
     log_info({.event = "ground_missing", .scene = scene_id}, "scene {}: nobody can walk in it: {}",
              scene_id, failure.what());
   }
-  if (files_) files_->write(name, bytes);
+  if (files_) files_->write(name, bytes, DerivedFiles::most_walkable_areas);
   return bytes;
 }
 

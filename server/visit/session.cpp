@@ -213,8 +213,8 @@ void Session::refuse(ClientConnection& from, ErrorCode code, std::string_view wh
   from.dismiss(CloseCode::policy_violation, why);
 }
 
-SceneAnswer Session::find_scene(const std::string& wish) {
-  const std::string scene_id = around_.scenes.resolve(wish);
+SceneAnswer Session::find_scene(const std::string& name) {
+  const std::string scene_id = around_.scenes.resolve(name);
   if (const auto refusal = around_.authorize(visitor_.token).refusal(scene_id, Use::own_session))
     return ErrorMessage{ErrorCode::unauthorized, *refusal, false};
   return catgs::find_scene(around_.scenes, scene_id, Clock::now());

@@ -18,7 +18,7 @@ namespace catgs {
 class Session;
 using SessionList = std::vector<std::shared_ptr<Session>>;
 
-/// Serves a session. The owner of all sessions implements it.
+/// What a session asks of the owner of all sessions.
 class Admissions {
  public:
   virtual ~Admissions() = default;
@@ -28,7 +28,7 @@ class Admissions {
                         std::shared_ptr<Session> newcomer, Hello hello, TimePoint now) = 0;
   virtual AdmissionAnswer admit(Session& session, const Hello& hello) = 0;
   /// `from`, the session's visitor, follows another session from now on, or none.
-  virtual void follow(Session& session, ClientConnection& from, const Follow& wish,
+  virtual void follow(Session& session, ClientConnection& from, const Follow& request,
                       TimePoint now) = 0;
   /// The session's visitor follows nobody any more, and gets a message.
   virtual void stop_following(Session& session) = 0;
@@ -86,7 +86,7 @@ class Session final : public VisitHost, public std::enable_shared_from_this<Sess
 
   // VisitHost
   AdmissionAnswer admit(const Hello& hello) override { return admissions_.admit(*this, hello); }
-  SceneAnswer find_scene(const std::string& wish) override;
+  SceneAnswer find_scene(const std::string& name) override;
   void sign(Welcome& welcome) override;
   void send(const ServerMessage& message) override;
   std::vector<std::uint64_t> send(OutgoingFrame frame) override;

@@ -217,14 +217,15 @@ void Sessions::watch(const std::shared_ptr<ClientConnection>& connection, Sessio
   around_.frames.changed(host);
 }
 
-void Sessions::follow(Session& session, ClientConnection& from, const Follow& wish, TimePoint now) {
+void Sessions::follow(Session& session, ClientConnection& from, const Follow& request,
+                      TimePoint now) {
   for (const auto& other : sessions_) other->audience().tour().remove(from);
-  if (wish.watch_token.empty()) return;
+  if (request.watch_token.empty()) return;
   const auto refuse = [&](ErrorCode code, std::string why) {
     session.visit().say(ErrorMessage{code, std::move(why), false}, now);
     session.visit().say(Lead{LeadState::ended, {}, 0, {}}, now);
   };
-  const auto found = tour_host(wish.watch_token, session.visitor().token);
+  const auto found = tour_host(request.watch_token, session.visitor().token);
   if (const auto* error = std::get_if<ErrorMessage>(&found))
     return refuse(error->code, error->message);
   Session& host = *std::get<Session*>(found);

@@ -43,7 +43,8 @@ class Sessions final : public Admissions {
   AdmissionAnswer admit(Session& session, const Hello& hello) override {
     return admission_.admit(session, hello);
   }
-  void follow(Session& session, ClientConnection& from, const Follow& wish, TimePoint now) override;
+  void follow(Session& session, ClientConnection& from, const Follow& request,
+              TimePoint now) override;
   void stop_following(Session& session) override;
   Session* host_of(const ClientConnection& follower) override;
   void leave(Session& session) override;

@@ -24,18 +24,18 @@ bool same_but_for_camera(const Lead& a, const Lead& b) {
 
 }  // namespace
 
-void SharedTour::begin(const Present& wish, TimePoint now) {
+void SharedTour::begin(const Present& settings, TimePoint now) {
   if (!since_) {
     since_ = now;
     pings_.emplace(pings_per_second, pings_per_second, now);
   }
-  wish_ = wish;
+  settings_ = settings;
 }
 
 void SharedTour::end(bool elsewhere) {
   if (!std::exchange(since_, {})) return;
-  tell_followers(
-      Lead{.state = LeadState::ended, .name = wish_.name, .camera = {}, .elsewhere = elsewhere});
+  tell_followers(Lead{
+      .state = LeadState::ended, .name = settings_.name, .camera = {}, .elsewhere = elsewhere});
   followers_.clear();
   told_.reset();
   camera_.reset();
@@ -45,7 +45,8 @@ void SharedTour::end(bool elsewhere) {
 void SharedTour::add(const std::shared_ptr<ClientConnection>& follower) {
   remove(*follower);
   followers_.push_back(follower);
-  Lead now = told_.value_or(Lead{LeadState::leads, wish_.name, followers_.size(), {}, wish_.pings});
+  Lead now = told_.value_or(
+      Lead{LeadState::leads, settings_.name, followers_.size(), {}, settings_.pings});
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
   if (!positions_told_.places.empty())
@@ -80,10 +81,10 @@ void SharedTour::moved(const PoseSample& camera, TimePoint now) {
 std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoint now) {
   if (!since_) return std::nullopt;
   Lead lead{away ? LeadState::away : LeadState::leads,
-            wish_.name,
+            settings_.name,
             spectators + followers(),
             {},
-            wish_.pings};
+            settings_.pings};
   if (told_ && same_but_for_camera(*told_, lead)) {
     if (camera_is_new_) tell_camera(now);
     return std::nullopt;
@@ -94,7 +95,7 @@ std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoin
 }
 
 bool SharedTour::ping(const Pinged& pinged, TimePoint now) {
-  if (!since_ || !(pinged.by_leader || wish_.pings) || !pings_->take(now)) return false;
+  if (!since_ || !(pinged.by_leader || settings_.pings) || !pings_->take(now)) return false;
   tell_followers(pinged);
   return true;
 }
@@ -118,7 +119,8 @@ void SharedTour::tell_camera(TimePoint now) {
   next_camera_ = std::max(next_camera_, now) + between_cameras;
   camera_is_new_ = false;
   if (!since_ || followers_.empty()) return;
-  Lead lead = told_.value_or(Lead{LeadState::leads, wish_.name, followers(), {}, wish_.pings});
+  Lead lead =
+      told_.value_or(Lead{LeadState::leads, settings_.name, followers(), {}, settings_.pings});
   lead.camera = camera_;
   tell_followers(lead);
 }

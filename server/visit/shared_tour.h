@@ -14,11 +14,11 @@ namespace catgs {
 /// own and get the host's camera. Session thread only.
 class SharedTour {
  public:
-  void begin(const Present& wish, TimePoint now);
+  void begin(const Present& settings, TimePoint now);
   /// Tells the followers that it is over here. `elsewhere`: the host is in another scene.
   void end(bool elsewhere = false);
   /// The host gave this name when it began the tour; empty: it gave none.
-  [[nodiscard]] const std::string& name() const { return wish_.name; }
+  [[nodiscard]] const std::string& name() const { return settings_.name; }
   /// When it began; nothing: the visit hosts no tour.
   [[nodiscard]] std::optional<TimePoint> since() const { return since_; }
 
@@ -42,7 +42,7 @@ class SharedTour {
   /// Tells the followers of a ping. False: it is not allowed, or one of too many.
   bool ping(const Pinged& pinged, TimePoint now);
   /// Whether all participants hear where all are.
-  [[nodiscard]] bool tells_positions() const { return since_ && wish_.tells_places; }
+  [[nodiscard]] bool tells_positions() const { return since_ && settings_.tells_places; }
   /// Where all participants are now. Tells the followers, and returns true for all others, if that
   /// is new and they heard of it half a second ago or more.
   bool tell(const Company& company, TimePoint now);
@@ -54,7 +54,7 @@ class SharedTour {
   void tell_camera(TimePoint now);
 
   std::optional<TimePoint> since_;
-  Present wish_;
+  Present settings_;
   std::optional<Lead> told_;
   std::vector<std::weak_ptr<ClientConnection>> followers_;
   std::optional<PoseSample> camera_;

@@ -89,13 +89,6 @@ RunningServer::~RunningServer() {
 
 void RunningServer::join() { thread_.join(); }
 
-const RunningServer& shared_server() {
-  static const RunningServer server([](ServerConfig& config) {
-    config.max_sessions = 64;  // those that a case lost keep their places for a while
-  });
-  return server;
-}
-
 namespace {
 
 HttpReply exchange(int port, http::request<http::string_body> request,

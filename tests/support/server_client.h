@@ -49,10 +49,6 @@ class RunningServer {
   std::thread thread_;
 };
 
-/// One for all cases of a program that change nothing for each other: as by default, with room for
-/// many sessions.
-const RunningServer& shared_server();
-
 struct HttpReply {
   int status = 0;
   std::map<std::string, std::string> headers;  // lower-case names

@@ -4,8 +4,8 @@
 #include <boost/system/system_error.hpp>
 #include <fmt/format.h>
 
+#include "tests/server/net/suite_server.h"
 #include "tests/support/raw_socket.h"
-#include "tests/support/server_client.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 #include "tests/support/tls.h"
@@ -17,12 +17,12 @@ const std::vector<std::string> two_scenes = {"synth:city:2000", "synth:garden:20
 
 /// A server that asks for a token, for cases that change nothing for each other.
 const RunningServer& guarded_server() {
-  static const RunningServer server([](ServerConfig& config) {
+  static auto& server = *new SuiteServer([](ServerConfig& config) {
     config.scenes = two_scenes;
     config.token_file = static_token_file();
     config.token_key_file = link_key_file();
   });
-  return server;
+  return server.get();
 }
 
 TEST(ServerAccess, LimitsTheAddressesBehindAProxy) {

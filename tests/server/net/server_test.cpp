@@ -12,7 +12,7 @@
 #include "server/encode/decoder.h"
 #include "server/net/lws_websocket.h"
 #include "tests/render_core/scene/scene_test_support.h"
-#include "tests/support/server_client.h"
+#include "tests/server/net/suite_server.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 

@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/server/net/suite_server.h"
 #include "tests/support/descriptor_limit.h"
-#include "tests/support/server_client.h"
 #include "tests/support/test.h"
 
 namespace catgs::test {

@@ -228,6 +228,7 @@ TEST_F(SidecarUpload, IsNotSavedWhenItsAuthorHasGone) {
 }
 
 TEST_F(SidecarUpload, UnderWayWhenTheServerStopsIsAnswered) {
+  start();  // with all slots free
   std::vector<RawSocket> late;
   for (std::size_t i = 0; i < UploadSlots::small.of_a_link; ++i) {
     late.emplace_back(server->port());

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/support/server_client.h"
+#include "tests/server/net/suite_server.h"
 #include "tests/support/test.h"
 
 namespace catgs::test {
@@ -17,12 +17,12 @@ v1::ClientMessage watching_hello(const std::string& watch_token, const std::stri
 
 /// A server that visitors enter by links. Each case has a scene of its own.
 const RunningServer& server_of_links() {
-  static const RunningServer server([](ServerConfig& config) {
+  static auto& server = *new SuiteServer([](ServerConfig& config) {
     config.scenes = {"synth:city:2000", "synth:garden:2000", "synth:stress:2000"};
     config.token_key_file = link_key_file();
     config.min_fps = 0;
   });
-  return server;
+  return server.get();
 }
 
 void present_no_more(WireClient& host) {

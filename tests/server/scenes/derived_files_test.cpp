@@ -138,7 +138,7 @@ TEST_F(DerivedFilesTest, SmallFileIsReadAgain) {
   const std::string name = "hall-3f0c91d2-9b1deb4d3b7d4bad.walk";
   const auto any = [](const ByteSource&) {};
   EXPECT_EQ(cache.read(name, 100, any), std::nullopt);
-  cache.write(name, "steps");
+  cache.write(name, "steps", 1);
   EXPECT_EQ(cache.read(name, 100, any), "steps");
 }
 
@@ -162,8 +162,9 @@ TEST_F(DerivedFilesTest, SmallFilesThatWereUsedLastStay) {
   for (int i = 0; i < others; ++i) age(tree(name(i)), std::chrono::hours(others - i));
   const fs::path whole = tree("hall-3f0c91d2-9b1deb4d3b7d4bad.tree");
   age(whole, 1000h);
-  cache.write(name(others), "");
-  constexpr int gone = others + 1 - static_cast<int>(DerivedFiles::most_small_files);
+  constexpr int most = 250;
+  cache.write(name(others), "", most);
+  constexpr int gone = others + 1 - most;
   EXPECT_FALSE(fs::exists(trees_ / name(gone - 1)));
   EXPECT_TRUE(fs::exists(trees_ / name(gone)));
   EXPECT_TRUE(fs::exists(whole)) << "trees count apart";
@@ -176,7 +177,7 @@ TEST_F(DerivedFilesTest, SmallFilesOfOneSceneDropNoneOfOthers) {
   const auto name = [](std::size_t i) { return fmt::format("hall-00000001-{:016x}.walk", i); };
   constexpr std::size_t kept = DerivedFiles::most_small_files_of_scene;
   for (std::size_t i = 0; i < 2 * kept; ++i) {
-    cache.write(name(i), "");
+    cache.write(name(i), "", 3 * kept);
     age(trees_ / name(i), std::chrono::hours(2 * kept - i));
   }
   EXPECT_FALSE(fs::exists(trees_ / name(kept - 1)));

@@ -299,6 +299,11 @@ TEST_F(SceneTreesTest, PosterIsKeptForTheNextStart) {
   std::ofstream(file, std::ios::binary) << other;
   write("scenes/a.json", R"({"background": "#ffffff"})");
   EXPECT_NE(poster_of_next_start(), other) << "the author shows something else now";
+  for (const fs::path& kept : trees())
+    if (kept.extension() == ".jpg") std::ofstream(kept, std::ios::binary) << other;
+  EXPECT_EQ(poster_of_next_start(), other);
+  config_.up = "x";
+  EXPECT_NE(poster_of_next_start(), other) << "visits begin elsewhere now";
 }
 
 TEST_F(SceneTreesTest, AFailedBuildIsNotTriedAgainSoon) {

@@ -3,7 +3,7 @@ import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { default_stay_s, flight_to, type Tour } from '../tour/tour';
 
-export const film_fps = 30; // as server/films/film_wish.h has it
+export const film_fps = 30; // as server/films/film_request.h has it
 export const most_film_frames = 18_000;
 
 /** What a tour does, part after part. `reach`: the scene's scale to a visitor, world units. */
