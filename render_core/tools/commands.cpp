@@ -17,7 +17,7 @@ void add_missing_benchmarks(CLI::App& app) {
     CLI::App* command = app.add_subcommand(name, "Not in this build");
     command->prefix_command();  // its options are as unknown as itself
     command->group("Commands that measure, for builds with -DCATGS_BENCHMARKS=ON");
-    command->callback([name] {
+    command->parse_complete_callback([name] {  // before words that nobody knows are refused
       throw InputError(
           name, "", "is not in this build of catgs-render",
           "set -DCATGS_BENCHMARKS=ON in its build folder, with cmake, and build again");

@@ -1,5 +1,7 @@
 #include "server/scenes/derived_files.h"
 
+#include <fmt/format.h>
+
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
