@@ -23,8 +23,8 @@ std::string derived_name(const SceneLocation& scene, const std::string& facts,
 /// Reads the names, sizes and times of the scene's files. Throws InputError.
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 
-/// What the server has computed from scenes, in --cache-dir: trees, and small files, such as
-/// walkable areas and posters. Files of other names are left alone. Not thread-safe, but for the
+/// The files in --cache-dir that the server has computed from scenes: trees, and small files, such
+/// as walkable areas and posters. Files of other names are left alone. Not thread-safe, but for the
 /// small files.
 class DerivedFiles {
  public:

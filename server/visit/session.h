@@ -18,7 +18,7 @@ namespace catgs {
 class Session;
 using SessionList = std::vector<std::shared_ptr<Session>>;
 
-/// What a session asks of the owner of all sessions.
+/// The owner of all sessions, as one session sees it.
 class Admissions {
  public:
   virtual ~Admissions() = default;
@@ -55,7 +55,7 @@ struct Visitor {
   }
 };
 
-/// What a visit may ask of the server around it, beside its pictures.
+/// Rates of the requests that a visit may make, beside its pictures.
 struct RequestLimits {
   RateLimit shared_tours{2.0, 8.0, Clock::now()};
   RateLimit pings{2.0, 2.0, Clock::now()};

@@ -66,7 +66,7 @@ bool drawn_or_refused(std::string bytes) {
   }
 }
 
-// What the shape does not use is refused, whatever it says.
+// A slot that the shape does not use must be empty.
 TEST_F(ForgedTreeViews, UnusedSlotsThatClaimToBeUsedAreRefused) {
   for (const int degree : {1, 3}) {
     const ForgedTrees trees(degree);

@@ -180,7 +180,7 @@ TEST_F(SidecarUpload, ShowsWhatOthersWroteMeanwhile) {
   EXPECT_TRUE(tours_as(author)["document"]["etag"].is_null());
 }
 
-/// Of two kinds. Where the server keeps its scenes is the operator's matter.
+/// The answer keeps to itself where the server has its scenes: that concerns the operator alone.
 TEST_F(SidecarUpload, SaysWhereNothingCanBeWrittenAndNamesNoFolder) {
   EXPECT_EQ(http_put(server->port(), "/api/scenes/garden/sidecar", "{}", bearer(author)).status,
             409)

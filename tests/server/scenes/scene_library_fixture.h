@@ -25,7 +25,7 @@ class LibraryTest : public FolderTest {
         config_, RendererOptions{RendererKind::cpu, std::make_shared<ThreadPool>(2)}, background_,
         *io_, metrics_, [this] { return now_; });
   }
-  /// What the loader is through with comes to be known. With `ticks_` the library ticks meanwhile.
+  /// Runs the handlers of finished loads until it holds. With `ticks_` the library ticks meanwhile.
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 120'000 && !holds(); ++i) {
       io_->restart();
