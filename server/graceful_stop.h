@@ -26,7 +26,7 @@ class GracefulStop {
   /// `io` runs the session thread. Until start(), a signal ends the process at once.
   explicit GracefulStop(boost::asio::io_context& io) : signals_(io), timer_(io) {}
 
-  /// What is stopped. All outlive this object.
+  /// The parts to stop. All outlive this object.
   struct Parts {
     const ServerConfig& config;
     std::atomic<bool>& ready;

@@ -25,7 +25,7 @@ class DeviceSet;
 /// The client of --client-dir, or the one that was built with this program.
 StaticFiles find_client(const std::string& client_dir);
 
-/// What answers the requests of both ports: the functions of routes.h use it.
+/// Answers the requests of both ports: the functions of routes.h use it.
 struct RequestHandlers {
   /// All outlive the handlers.
   struct Parts {
@@ -53,7 +53,7 @@ struct RequestHandlers {
   FilmRenderer films;
 
  private:
-  /// What killed servers have left where authors save.
+  /// Removes what killed servers have left where authors save.
   void remove_stale_files();
 };
 

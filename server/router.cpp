@@ -41,9 +41,9 @@ std::optional<HttpResponse> Router::refuse_upload(const HttpRequest& request) co
 }
 
 std::future<HttpResponse> Router::take_upload(const HttpRequest& request, std::string body,
-                                              std::shared_ptr<const UploadSlot> place) const {
+                                              std::shared_ptr<const UploadSlot> slot) const {
   const Route& route = *find_route(routes_, HttpMethod::put, request.path);
-  return route.handler.take(handlers_, routed(route, request), {std::move(body), std::move(place)});
+  return route.handler.take(handlers_, routed(route, request), {std::move(body), std::move(slot)});
 }
 
 RouteRequest Router::routed(const Route& route, const HttpRequest& request) const {

@@ -27,8 +27,8 @@ class Router {
   // See HttpUploads.
   [[nodiscard]] std::size_t most_bytes(std::string_view path) const;
   [[nodiscard]] std::optional<HttpResponse> refuse_upload(const HttpRequest& request) const;
-  [[nodiscard]] std::future<HttpResponse> take_upload(
-      const HttpRequest& request, std::string body, std::shared_ptr<const UploadSlot> place) const;
+  [[nodiscard]] std::future<HttpResponse> take_upload(const HttpRequest& request, std::string body,
+                                                      std::shared_ptr<const UploadSlot> slot) const;
 
  private:
   /// With the permit of the request's token, if the route asks for one.

@@ -16,7 +16,7 @@ constexpr std::string_view no_client_page =
     "CaT-GS server: the browser client was not built with this server.\n"
     "Configure with -DCATGS_WEB=ON, or give --client-dir.\n";
 
-// Of both ports: probes of the admin port need neither TLS nor a host name.
+// Both ports: probes of the admin port need neither TLS nor a host name.
 
 HttpResponse health(RequestHandlers& handlers, const RouteRequest&) {
   const std::string complaint = handlers.parts.liveness.complaint();
@@ -29,7 +29,7 @@ HttpResponse readiness(RequestHandlers& handlers, const RouteRequest& request) {
   return handlers.parts.ready ? text_response(200, "ready\n") : text_response(503, "not ready\n");
 }
 
-// Of the public port.
+// The public port.
 
 HttpResponse front_page(RequestHandlers& handlers, const RouteRequest& request) {
   const StaticFiles& client = handlers.parts.client;
@@ -78,7 +78,7 @@ std::optional<HttpResponse> refuse_media(RequestHandlers& handlers, const RouteR
 std::future<HttpResponse> save_media(RequestHandlers& handlers, const RouteRequest& request,
                                      Upload upload) {
   return handlers.media.save(request.http, request.scene_id, std::string(request.parts[1]),
-                             std::move(upload.body), std::move(upload.place));
+                             std::move(upload.body), std::move(upload.slot));
 }
 
 std::future<HttpResponse> save_sidecar(RequestHandlers& handlers, const RouteRequest& request,
@@ -86,13 +86,13 @@ std::future<HttpResponse> save_sidecar(RequestHandlers& handlers, const RouteReq
   return handlers.saver.save(
       request.scene_id, std::move(upload.body),
       {std::string(request.http.if_match), std::string(request.http.if_none_match)},
-      std::move(upload.place));
+      std::move(upload.slot));
 }
 
 std::future<HttpResponse> order_film(RequestHandlers& handlers, const RouteRequest& request,
                                      Upload upload) {
   return handlers.films.order(request.scene_id, request.permit.token_id, std::move(upload.body),
-                              std::move(upload.place));
+                              std::move(upload.slot));
 }
 
 HttpResponse film_report(RequestHandlers& handlers, const RouteRequest& request) {
@@ -113,13 +113,13 @@ std::optional<HttpResponse> refuse_cancel(RequestHandlers& handlers, const Route
 
 std::future<HttpResponse> take_cancel(RequestHandlers& handlers, const RouteRequest& request,
                                       Upload upload) {
-  upload.place.reset();  // it is free before the answer comes
+  upload.slot.reset();  // it is free before the answer comes
   std::promise<HttpResponse> answer;
   answer.set_value(cancel_film(handlers, request));
   return answer.get_future();
 }
 
-// Of the admin port.
+// The admin port.
 
 HttpResponse not_here(RequestHandlers&, const RouteRequest&) {
   return text_response(404, "404: /metrics, /visits, /api/metrics and /api/sessions are here\n");

@@ -28,10 +28,10 @@ struct RouteRequest {
 
 struct Upload {
   std::string body;
-  std::shared_ptr<const UploadSlot> place;
+  std::shared_ptr<const UploadSlot> slot;
 };
 
-/// What a token must allow its sender to do with the scene in the path.
+/// The right to the scene in the path that a token must give its sender.
 enum class Right {
   none,  // the path names no scene
   see,

@@ -63,7 +63,7 @@ struct Server::State {
         access(config.token_file, config.token_key_file, config.open, config.revoked_links,
                read_own_key(config.resume_key_file, config.token_key_file)),
         client(find_client(config.client_dir)),
-        net(net_options()),
+        net(net_options(), background),
         core{.kind = config.renderer,
              .pool = std::make_shared<ThreadPool>(config.threads),
              .devices = std::make_shared<DeviceSet>(config.devices)} {}
@@ -77,7 +77,7 @@ struct Server::State {
   Metrics metrics;
   const StaticFiles client;
   std::atomic<bool> ready{false};
-  const std::shared_ptr<Background> background = std::make_shared<Background>(lanes::all);
+  Background background{all_lanes};
   NetServer net;
   boost::asio::io_context io{1};  // outlives the pool of the core, whose tasks post to it
   RendererOptions core;           // all scenes' Views are counted in one set of devices
@@ -94,7 +94,6 @@ struct Server::State {
 
 NetOptions Server::State::net_options() {
   NetOptions options;
-  options.background = background;
   options.listen = {config.bind, config.port};
   options.http = [this](const HttpRequest& request) { return router->respond(request); };
   options.serves_delete = [this](std::string_view path) { return router->serves_delete(path); };
@@ -103,8 +102,8 @@ NetOptions Server::State::net_options() {
     return router->refuse_upload(request);
   };
   options.uploads.take = [this](const HttpRequest& request, std::string body,
-                                std::shared_ptr<const UploadSlot> place) {
-    return router->take_upload(request, std::move(body), std::move(place));
+                                std::shared_ptr<const UploadSlot> slot) {
+    return router->take_upload(request, std::move(body), std::move(slot));
   };
   options.uploads.on_full = [this] { metrics.uploads_refused.Increment(); };
   options.accept = [this](std::shared_ptr<Connection> connection) {
@@ -141,9 +140,9 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   if (s.config.visit_counts != "off") {
     s.counts.emplace(unix_now_s);
     s.statistics.emplace(s.config.visit_counts == "memory" ? "" : s.config.visit_counts, *s.counts,
-                         *s.background);
+                         s.background);
   }
-  s.scenes = std::make_unique<SceneLibrary>(s.config, s.core, *s.background, s.io, s.metrics);
+  s.scenes = std::make_unique<SceneLibrary>(s.config, s.core, s.background, s.io, s.metrics);
   s.encoders = usable_encoders(s.config.encoder, probe_encoders());
   auto authorize = [&s](const std::string& token) {
     const auto resolve = [&s](auto name) { return s.scenes->resolve(name); };
@@ -167,7 +166,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
                    authorize, SessionTokens(s.access.own_key()), s.metrics,
                    s.counts ? &*s.counts : nullptr, [&s] { return s.access.revoked_links(); }});
   s.handlers.emplace(RequestHandlers::Parts{
-      s.io, *s.background, s.config, *s.scenes, s.access, authorize, *s.sessions, *s.core.devices,
+      s.io, s.background, s.config, *s.scenes, s.access, authorize, *s.sessions, *s.core.devices,
       s.liveness, s.ready, s.metrics, s.client, s.statistics ? &*s.statistics : nullptr});
   s.router.emplace(public_routes(), *s.handlers);
   s.admin_router.emplace(admin_routes(), *s.handlers);
@@ -204,7 +203,6 @@ int Server::port() const { return state_->net.port(); }
 int Server::admin_port() const { return state_->net.admin_port(); }
 
 void Server::State::print_banner() const {
-  log_info({.event = "renderer"}, "renderer: {}", scenes->renderer_text());
   log_info({.event = "encoder"}, "encoder: {}", encoders.front().text);
   if (net.admin_port() != 0)
     log_info({.event = "metrics"}, "metrics: http://{}/metrics",

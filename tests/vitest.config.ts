@@ -6,8 +6,10 @@ export default defineConfig({
   server: { host: '127.0.0.1' },
   resolve: { alias: { '#client': fileURLToPath(new URL('../web_client/src', import.meta.url)) } },
   test: {
-    // Files share what they import.
+    // Files share what they import; tests share no stubs.
     isolate: false,
+    unstubGlobals: true,
+    restoreMocks: true,
     projects: [
       { extends: true, test: { name: 'unit', include: ['web_client/**/*.test.ts'] } },
       {

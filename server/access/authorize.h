@@ -22,8 +22,8 @@ enum class Use {
 /// The reason of a refusal, for people; nothing: allowed.
 using Refusal = std::optional<std::string>;
 
-/// What a token permits, as of when it was read. Checking a token takes time; asking a Permit about
-/// each scene does not.
+/// The rights of a token, as of when it was read. Checking a token takes time; asking a Permit
+/// about each scene does not.
 struct Permit {
   using Check = std::function<Refusal(std::string_view scene_id, Use use)>;
 

@@ -20,9 +20,9 @@ void sleep_unless_stopped(Clock::duration duration, const std::stop_token& stop)
   (void)stopped.try_acquire_for(duration);
 }
 
-Background::Background(std::span<const Lane> lanes) {
+Background::Background(std::span<const Lane> to_start) {
   const std::lock_guard lock(mutex_);
-  for (const Lane& lane : lanes) {
+  for (const Lane& lane : to_start) {
     LaneState& state = lanes_.try_emplace(lane.name, lane).first->second;
     while (state.threads.size() < lane.threads) start_thread(state);
   }

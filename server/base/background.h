@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -33,19 +34,19 @@ struct Lane {
   std::size_t threads = 1;
   bool in_background = false;  // threads that serve visitors go first
 };
-namespace lanes {
-inline constexpr Lane disk{"disk", 2};  // pieces of files that are served
-inline constexpr Lane film_requests{"film requests"};
-inline constexpr Lane films{"films", 1, true};
-inline constexpr Lane media{"media"};        // authors' uploads
-inline constexpr Lane scenes{"scenes"};      // loads, and scans of folders
-inline constexpr Lane sidecars{"sidecars"};  // authors' saves
-inline constexpr Lane trees{"trees", 1, true};
-inline constexpr Lane visit_counts{"visit counts"};
-inline constexpr Lane walkable_areas{"walkable areas", 1, true};
-inline constexpr std::array all{disk,     film_requests, films,        media,         scenes,
-                                sidecars, trees,         visit_counts, walkable_areas};
-}  // namespace lanes
+struct Lanes {
+  Lane disk{"disk", 2};  // pieces of files that are served
+  Lane film_requests{"film requests"};
+  Lane films{"films", 1, true};
+  Lane media{"media"};        // authors' uploads
+  Lane scenes{"scenes"};      // loads, and scans of folders
+  Lane sidecars{"sidecars"};  // authors' saves
+  Lane trees{"trees", 1, true};
+  Lane visit_counts{"visit counts"};
+  Lane walkable_areas{"walkable areas", 1, true};
+};
+inline constexpr Lanes lanes;
+inline const auto all_lanes = std::bit_cast<std::array<Lane, sizeof(Lanes) / sizeof(Lane)>>(lanes);
 
 /// Within a lane. A low job under way is stopped when a higher one waits, and starts anew later.
 enum class Priority { low, normal, high };
@@ -72,7 +73,7 @@ class Background {
  public:
   /// Starts the threads of these lanes; those of others start with their first jobs. A server
   /// starts all before it runs, so that none inherits the scheduling of a prompt thread.
-  explicit Background(std::span<const Lane> lanes = {});
+  explicit Background(std::span<const Lane> to_start = {});
 
   /// Returns after how long it is to run again; nothing: it is done. Exceptions are logged.
   using Work = std::function<std::optional<Clock::duration>(const std::stop_token& stop)>;

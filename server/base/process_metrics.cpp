@@ -56,8 +56,18 @@ double cpu_seconds() {
 
 }  // namespace
 
+double HeapUse::bytes() {
+  const std::lock_guard lock(mutex_);
+  const TimePoint now = Clock::now();
+  if (within(counted_, std::chrono::seconds(30), now)) return bytes_;
+  const auto heap = ::mallinfo2();
+  counted_ = now;
+  return bytes_ = static_cast<double>(heap.uordblks + heap.hblkhd);
+}
+
 std::vector<prometheus::MetricFamily> process_metrics() {
   constexpr int start_time_field = 22, resident_pages_field = 24;  // proc(5)
+  static HeapUse heap;
   std::vector<prometheus::MetricFamily> families;
   families.push_back(family("process_cpu_seconds_total", "Processor time, user and system",
                             MetricType::Counter, cpu_seconds()));
@@ -65,9 +75,8 @@ std::vector<prometheus::MetricFamily> process_metrics() {
     families.push_back(
         family("process_resident_memory_bytes", "Resident memory", MetricType::Gauge,
                static_cast<double>(*pages) * static_cast<double>(sysconf(_SC_PAGESIZE))));
-  const auto heap = ::mallinfo2();
   families.push_back(family("process_heap_bytes", "Memory that the C library has given out",
-                            MetricType::Gauge, static_cast<double>(heap.uordblks + heap.hblkhd)));
+                            MetricType::Gauge, heap.bytes()));
   std::error_code error;
   using Folder = std::filesystem::directory_iterator;
   const Folder descriptors("/proc/self/fd", error);

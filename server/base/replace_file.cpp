@@ -67,6 +67,8 @@ void sync_folder(const fs::path& folder) {
 
 Replacement::Replacement(const fs::path& file, std::string_view content, std::string_view remedy)
     : file_(file), remedy_(remedy), fresh_(new_file(file, remedy)) {
+  if (std::error_code error; fs::is_directory(file, error))
+    throw InputError(file.filename().string(), {}, "is a folder", "have the folder removed");
   write(fresh_.descriptor(), content, file_, remedy_);
 }
 

@@ -19,7 +19,11 @@ inline std::ifstream open_required_file(std::string_view flag, const std::filesy
                      "check the path and that the server's user may read the file");
   };
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) fail("it is a folder");
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_directory(status)) fail("it is a folder");
+  // Opening a named pipe waits for a writer.
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    fail("it is not a regular file");
   std::ifstream in(path, std::ios::binary);
   if (!in) fail(std::generic_category().message(errno));
   return in;

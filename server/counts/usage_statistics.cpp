@@ -85,7 +85,7 @@ UsageStatistics::UsageStatistics(fs::path folder, VisitCounts& counts, Backgroun
   if (folder_.empty()) return;
   lock_.emplace(own_folder("--visit-counts", folder_, "visits.lock"));
   drop_old_days();
-  jobs_.start(lanes::visit_counts, Priority::normal,
+  jobs_.start(lanes.visit_counts, Priority::normal,
               [this, save_interval, waited = false](const std::stop_token&) mutable {
                 if (std::exchange(waited, true)) try {
                     save();

@@ -22,7 +22,7 @@ struct StopId {
   auto operator<=>(const StopId&) const = default;
 };
 
-/// What was counted of one scene on one day. Nothing in it tells visitors apart.
+/// The counts of one scene on one day. Nothing in it tells visitors apart.
 struct SceneCounts {
   std::uint64_t visits = 0;
   double seconds = 0.0;     // on show: connected, and the page was not hidden
@@ -37,9 +37,9 @@ using DayCounts = std::map<std::string, SceneCounts>;  // by the scene's id
 class VisitCounts {
  public:
   static constexpr std::size_t most_days = 400;
-  /// Of a day. Further scenes are counted together, as `other_scenes`.
+  /// On one day. Further scenes are counted together, as `other_scenes`.
   static constexpr std::size_t most_scenes = 1000;
-  /// Of a day, in all scenes. Further stops are not counted.
+  /// On one day, in all scenes. Further stops are not counted.
   static constexpr std::size_t most_stops = 20'000;
   /// Scenes and stops of all days. Beyond it the oldest day goes.
   static constexpr std::size_t most_entries = 400'000;

@@ -247,7 +247,7 @@ HttpResponse day_by_day(const UsageStatistics& statistics, DayByDay::Parts parts
   return response;
 }
 
-/// Of all days that were kept.
+/// All days that were kept.
 HttpResponse csv(const UsageStatistics& statistics, std::string head,
                  std::function<std::string(const std::string& date, const DayCounts& day)> of_day) {
   return day_by_day(

@@ -77,17 +77,17 @@ HttpResponse FilmRenderer::cancel(std::string_view id) {
 
 std::future<HttpResponse> FilmRenderer::order(std::string scene_id, std::string owner,
                                               std::string json,
-                                              std::shared_ptr<const UploadSlot> place) {
+                                              std::shared_ptr<const UploadSlot> slot) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
   // An order is too long to be read on the network thread.
-  jobs_.start(lanes::film_requests, Priority::normal,
+  jobs_.start(lanes.film_requests, Priority::normal,
               [this, answer, scene_id = std::move(scene_id), owner = std::move(owner),
-               json = std::move(json), place = std::move(place)](const auto&) mutable {
-                if (place->abandoned()) return;
+               json = std::move(json), slot = std::move(slot)](const auto&) mutable {
+                if (slot->abandoned()) return;
                 HttpResponse response = take(std::move(scene_id), std::move(owner), json);
                 std::string().swap(json);
-                place.reset();  // it is free before the answer comes
+                slot.reset();  // it is free before the answer comes
                 answer->set_value(std::move(response));
               });
   return future;
@@ -111,7 +111,7 @@ HttpResponse FilmRenderer::take(std::string scene_id, std::string owner, const s
   boost::asio::post(around_.io, [queue = queue_, lease = around_.lease, scene_id, id] {
     if (const auto held = lease(scene_id, false).lease) queue->found_scene(id, held->content());
   });
-  jobs_.start(lanes::films, Priority::normal, [this](const std::stop_token& stop) {
+  jobs_.start(lanes.films, Priority::normal, [this](const std::stop_token& stop) {
     if (const auto job = queue_->start_next()) draw(*job, stop);
   });
   return json_response(202, {{"id", id}});

@@ -48,10 +48,10 @@ class FilmRenderer {
   std::optional<HttpResponse> refuse_cancel(std::string_view id);
   HttpResponse cancel(std::string_view id);
   /// Takes an order (film_request.h); answers 202 with {"id": JOB}. The caller has checked that the
-  /// sender may save the scene. `owner`: id of its token. One whose place is abandoned meanwhile
+  /// sender may save the scene. `owner`: id of its token. One whose slot is abandoned meanwhile
   /// orders nothing.
   std::future<HttpResponse> order(std::string scene_id, std::string owner, std::string json,
-                                  std::shared_ptr<const UploadSlot> place);
+                                  std::shared_ptr<const UploadSlot> slot);
 
  private:
   /// Nothing: there is no such job, or its link was revoked.

@@ -21,7 +21,7 @@ class AcceptGate {
   /// The addresses that are remembered while none of their connections is open.
   static constexpr std::size_t most_addresses = 16'384;
 
-  /// What one address may have. An answer ends its connection, so a page of 20 files needs as many.
+  /// The share of one address. An answer ends its connection, so a page of 20 files needs as many.
   struct Bounds {
     int open;
     int silent;  // without a whole request yet: what they cost comes all at once

@@ -27,7 +27,7 @@ class DiskJobs {
     auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
     auto result = task->get_future();
     const auto job = jobs_.start(
-        lanes::disk, Priority::normal,
+        lanes.disk, Priority::normal,
         [this, task = std::move(task), waiter = std::move(waiter)](const std::stop_token&) {
           auto waits = waiter.lock();
           if (!waits) return;

@@ -92,7 +92,7 @@ struct Precondition {
 /// Called on the network thread; must not block.
 using HttpHandler = std::function<HttpResponse(const HttpRequest&)>;
 
-/// Longer uploads, where they are allowed, have places of their own.
+/// Longer uploads, where they are allowed, have slots of their own.
 inline constexpr std::size_t max_upload_bytes = 2 << 20;  // the camera of a film of ten minutes
 
 /// Handles PUT requests. None are accepted if `take` is null. All functions are called on the
@@ -101,11 +101,11 @@ struct HttpUploads {
   /// Refuses a request by its head, or returns nothing. Its origin was already allowed.
   std::function<std::optional<HttpResponse>(const HttpRequest&)> refusal;
   /// Takes a complete body. Any thread may fulfil the promise; a broken promise becomes status 503.
-  /// The body's owner also holds `place` and may drop both when the place is abandoned.
+  /// The body's owner also holds `slot` and may drop both when the slot is abandoned.
   std::function<std::future<HttpResponse>(const HttpRequest&, std::string body,
-                                          std::shared_ptr<const UploadSlot> place)>
+                                          std::shared_ptr<const UploadSlot> slot)>
       take;
-  /// Called when an upload finds no free place.
+  /// Called when an upload finds no free slot.
   std::function<void()> on_full = [] {};
   /// The longest body for a path.
   std::function<std::size_t(std::string_view path)> most_bytes = [](std::string_view) {

@@ -53,17 +53,17 @@ bool is_served_delete(lws* wsi) {
 constexpr int keep_reading = 0;
 constexpr int close_connection = -1;
 
-/// Keeps an upload's body if a place is free.
+/// Keeps an upload's body if a slot is free.
 int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
   Service& service = service_of(wsi);
   const bool large = bytes > max_upload_bytes;
   if (auto refusal = refuse_upload(wsi))
     return large ? exchange.refuse_body(wsi, *std::move(refusal), service.scratch)
                  : exchange.begin_refused_upload(wsi, *std::move(refusal));
-  UploadSlots& places = large ? service.large_uploads : service.uploads;
+  UploadSlots& slots = large ? service.large_uploads : service.uploads;
   const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  if (auto place = places.take(link, limited_as(client_address_of(wsi))))
-    return exchange.begin_upload(wsi, place, bytes);
+  if (auto slot = slots.take(link, limited_as(client_address_of(wsi))))
+    return exchange.begin_upload(wsi, slot, bytes);
   site_of(wsi).uploads.on_full();
   return exchange.refuse_body(
       wsi, busy_response("503: others are saving at the moment: try again in a second\n"),

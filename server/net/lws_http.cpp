@@ -147,15 +147,15 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
 
 LwsHttpExchange::~LwsHttpExchange() {
   waiter_->wsi = nullptr;
-  if (place_) place_->abandon();
+  if (slot_) slot_->abandon();
 }
 
-int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadSlot> place, std::size_t bytes) {
+int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadSlot> slot, std::size_t bytes) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
   authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
   precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),
                    request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH)};
-  place_ = std::move(place);
+  slot_ = std::move(slot);
   announced_bytes_ = bytes;
   body_.reserve(bytes);
   await_body(wsi, bytes);
@@ -189,7 +189,7 @@ void LwsHttpExchange::set_body_timer(lws* wsi) {
 int LwsHttpExchange::take_body(lws* wsi, std::string_view bytes) {
   if (has_gone(wsi)) return -1;
   if (body_due_) body_due_->arrived(bytes.size(), Clock::now());
-  if (body_due_ && place_) {
+  if (body_due_ && slot_) {
     if (body_.size() + bytes.size() > announced_bytes_) return -1;
     body_.append(bytes);
     return 0;
@@ -209,7 +209,7 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
   request.if_match = precondition_.if_match;
   request.method = HttpMethod::put;
   lws_rx_flow_control(wsi, 0);  // see AnsweredConnections
-  answer_ = uploads.take(request, std::move(body_), place_);
+  answer_ = uploads.take(request, std::move(body_), slot_);
   lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, answer_timeout_s);
   lws_set_timer_usecs(wsi, answer_poll_us);
   return 0;

@@ -31,8 +31,8 @@ class LwsHttpExchange {
   /// Reads the request, asks `handler` and begins to answer, or to prepare the answer on the disk's
   /// threads. `site`: HttpRequest::site.
   int begin(lws* wsi, const HttpHandler& handler, const std::string& site);
-  /// Accepts a PUT request. Its body of so many bytes is kept in `place`.
-  int begin_upload(lws* wsi, std::shared_ptr<UploadSlot> place, std::size_t bytes);
+  /// Accepts a PUT request. Its body of so many bytes is kept in `slot`.
+  int begin_upload(lws* wsi, std::shared_ptr<UploadSlot> slot, std::size_t bytes);
   /// Refuses a PUT request after its body has arrived. The body is dropped.
   int begin_refused_upload(lws* wsi, HttpResponse refusal);
   /// Refuses a PUT request at once. The rest of the body is read and dropped, within bounds:
@@ -40,7 +40,7 @@ class LwsHttpExchange {
   /// answer is written now, not when the socket is writable, just as headers are. It is only one
   /// line longer, nothing else is in flight, and libwebsockets buffers the rest.
   int refuse_body(lws* wsi, HttpResponse response, std::vector<std::byte>& scratch);
-  /// Takes a piece of a body. It is kept only for an upload that has a place.
+  /// Takes a piece of a body. It is kept only for an upload that has a slot.
   int take_body(lws* wsi, std::string_view bytes);
   /// The body is complete. An upload's body is handed to `uploads`. on_timer() is then called by
   /// LWS_CALLBACK_TIMER.
@@ -85,7 +85,7 @@ class LwsHttpExchange {
   std::string path_;
   std::string authorization_;
   Precondition precondition_;
-  std::shared_ptr<UploadSlot> place_;
+  std::shared_ptr<UploadSlot> slot_;
   std::size_t announced_bytes_ = 0;
   std::string body_;
   std::optional<HttpResponse> refusal_;

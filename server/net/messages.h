@@ -48,7 +48,7 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 
-/// What the visitor holds, as the page sees it.
+/// The visitor's device, as the page sees it.
 enum class DeviceKind { unknown, desktop, phone, tablet, headset };
 inline constexpr std::size_t device_kinds = 5;
 inline constexpr std::array<std::string_view, device_kinds> device_names = {

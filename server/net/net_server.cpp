@@ -77,11 +77,9 @@ Names names_of(const Endpoint& endpoint, bool asks_for_tokens) {
 }  // namespace
 
 struct NetServer::State {
-  explicit State(const NetOptions& options)
-      : background(options.background),
-        service(AcceptGate::bounds_for(options.sessions_of_an_address), *background) {}
+  State(int sessions_of_an_address, Background& background)
+      : service(AcceptGate::bounds_for(sessions_of_an_address), background) {}
 
-  const std::shared_ptr<Background> background;
   Site site;
   Site admin_site;
   Service service;
@@ -130,7 +128,8 @@ int NetServer::State::listen(const char* name, const Endpoint& endpoint, const c
   return lws_get_vhost_listen_port(made);
 }
 
-NetServer::NetServer(NetOptions options) : state_(std::make_unique<State>(options)) {
+NetServer::NetServer(NetOptions options, Background& background)
+    : state_(std::make_unique<State>(options.sessions_of_an_address, background)) {
   // A write to a closed peer is an error code, not a signal.
   std::signal(SIGPIPE, SIG_IGN);
   lws_set_log_level(log_levels, log_errors);

@@ -22,7 +22,6 @@ struct Endpoint {
 };
 
 struct NetOptions {
-  std::shared_ptr<Background> background = std::make_shared<Background>();  // reads files
   Endpoint listen;
   HttpHandler http;     // pages and /api of the public port
   HttpUploads uploads;  // to the public port
@@ -54,8 +53,9 @@ struct NetOptions {
 /// until start().
 class NetServer {
  public:
-  /// Throws InputError when an address cannot be bound or a certificate cannot be used.
-  explicit NetServer(NetOptions options);
+  /// `background` reads files, and outlives this object. Throws InputError when an address cannot
+  /// be bound or a certificate cannot be used.
+  NetServer(NetOptions options, Background& background);
   ~NetServer();  // stop()
   NetServer(const NetServer&) = delete;
   NetServer& operator=(const NetServer&) = delete;
@@ -67,7 +67,7 @@ class NetServer {
 
   [[nodiscard]] int port() const;        // really bound
   [[nodiscard]] int admin_port() const;  // 0 without an admin endpoint
-  /// Uploads that have a place. Any thread.
+  /// Uploads that have a slot. Any thread.
   [[nodiscard]] std::size_t uploads() const;
 
  private:

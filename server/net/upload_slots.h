@@ -9,7 +9,7 @@
 
 namespace catgs {
 
-/// One upload's place, held by its connection and by everything that keeps the body in memory.
+/// One upload's slot, held by its connection and by everything that keeps the body in memory.
 class UploadSlot {
  public:
   /// The connection was closed, so nobody waits for the answer any more.
@@ -20,7 +20,7 @@ class UploadSlot {
   std::atomic<bool> abandoned_{false};
 };
 
-/// Bounds the uploads in memory. A place is free again when its last holder is gone. Thread-safe.
+/// Bounds the uploads in memory. A slot is free again when its last holder is gone. Thread-safe.
 class UploadSlots {
  public:
   struct Bounds {
@@ -33,7 +33,7 @@ class UploadSlots {
 
   explicit UploadSlots(const Bounds& bounds) : bounds_(bounds) {}
 
-  /// Returns null if no place is free. `link` is the sender's Authorization header.
+  /// Returns null if no slot is free. `link` is the sender's Authorization header.
   std::shared_ptr<UploadSlot> take(const std::string& link, const std::string& address);
   [[nodiscard]] std::size_t taken() const;
 
@@ -41,12 +41,12 @@ class UploadSlots {
   struct Taken {
     std::string link;
     std::string address;
-    std::weak_ptr<const UploadSlot> place;
+    std::weak_ptr<const UploadSlot> slot;
   };
 
   const Bounds bounds_;
   mutable std::mutex mutex_;
-  std::vector<Taken> taken_;  // may hold freed places; take() removes them
+  std::vector<Taken> taken_;  // may hold freed slots; take() removes them
 };
 
 }  // namespace catgs

@@ -44,8 +44,8 @@ bool is_tree_name(std::string_view name) {
   return name.ends_with(tree_extension) && is_derived_name(name);
 }
 
-/// What a killed build leaves of a tree, besides NewFile: ScratchFile adds to its name. Earlier
-/// versions added ".part", and named walkable areas by two digests alone.
+/// The remains of a tree whose build was killed, besides NewFile: ScratchFile adds to its name.
+/// Earlier versions added ".part", and named walkable areas by two digests alone.
 bool is_remnant(std::string_view name) {
   constexpr std::size_t former_walk_digits = 16 + 1 + 32;
   const std::size_t stem = name.rfind('.');
@@ -178,8 +178,9 @@ std::optional<std::string> DerivedFiles::read(const std::string& name, std::size
     fs::last_write_time(path, fs::file_time_type::clock::now(), error);
     return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   } catch (const InputError& failure) {
-    log_warning({.event = "cached_file_unusable"}, "removed: {}", failure.what());
-    fs::remove(path, error);
+    const bool removed = fs::remove(path, error);
+    log_warning({.event = "cached_file_unusable"}, "{}: {}", removed ? "removed" : "not used",
+                failure.what());
     return std::nullopt;
   }
 }

@@ -153,7 +153,7 @@ std::optional<HttpResponse> MediaApi::refuse_upload(const std::string& scene_id,
 
 std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::string& scene_id,
                                          std::string name, std::string content,
-                                         std::shared_ptr<const UploadSlot> place) {
+                                         std::shared_ptr<const UploadSlot> slot) {
   auto answer = std::make_shared<std::promise<HttpResponse>>();
   auto future = answer->get_future();
   const auto folder = folder_of(scene_id);
@@ -184,13 +184,13 @@ std::future<HttpResponse> MediaApi::save(const HttpRequest& request, const std::
              scene_id, name, bytes.size());
     return text_response(200, "saved\n");
   };
-  jobs_.start(lanes::media, Priority::normal,
+  jobs_.start(lanes.media, Priority::normal,
               [write, answer, content = std::move(content),
-               place = std::move(place)](const std::stop_token&) mutable {
+               slot = std::move(slot)](const std::stop_token&) mutable {
                 HttpResponse response = busy_response("503: the connection is closed\n");
-                if (!place->abandoned()) response = write(content, *place);
-                std::string().swap(content);  // the place is free before the answer comes
-                place.reset();
+                if (!slot->abandoned()) response = write(content, *slot);
+                std::string().swap(content);  // the slot is free before the answer comes
+                slot.reset();
                 answer->set_value(std::move(response));
               });
   return future;

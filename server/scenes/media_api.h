@@ -46,7 +46,7 @@ class MediaApi {
   /// Adds or replaces a file. See HttpUploads::take.
   std::future<HttpResponse> save(const HttpRequest& request, const std::string& scene_id,
                                  std::string name, std::string content,
-                                 std::shared_ptr<const UploadSlot> place);
+                                 std::shared_ptr<const UploadSlot> slot);
 
  private:
   /// The folder of a scene in memory; nothing: the scene is not, or it is no file.

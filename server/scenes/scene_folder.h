@@ -26,7 +26,7 @@ struct FoundScene {
   std::string tree{};  // tree_name(), for a scene that may get one; else empty
 };
 
-/// What is read of scenes that are found.
+/// Options of a scan of folders.
 struct SceneScanOptions {
   SceneIds ids;
   LoadOptions levels;  // see read_scene_size()

@@ -11,7 +11,7 @@ namespace catgs {
 /// True if --scene names a procedural scene, synth:KIND:COUNT[:SEED].
 inline bool is_synthetic(std::string_view spec) { return spec.starts_with("synth:"); }
 
-/// What two values of --scene, or two paths, have in common if they name the same scene: its path,
+/// The key that two values of --scene, or two paths, share if they name the same scene: its path,
 /// with symbolic links among its folders resolved, or the words of a procedural scene. A link in
 /// place of the scene itself is a scene of its own, as its sidecar lies beside it.
 std::string scene_key(const std::string& spec);

@@ -62,19 +62,12 @@ void SceneIndex::merge(std::vector<FoundScene> found,
   });
 }
 
-std::string SceneIndex::default_scene() const {
-  const auto preferred = records_.find(preferred_);
-  if (preferred != records_.end() && !preferred->second.gone) return preferred_;
-  const auto other = std::ranges::find_if(records_, [](const auto& of) { return !of.second.gone; });
-  return other != records_.end() ? other->first : std::string();
-}
-
 std::vector<std::string> SceneIndex::scene_ids() const {
   std::vector<std::string> ids;
   for (const auto& [id, record] : records_)
     if (!record.gone) ids.push_back(id);
-  // Newcomers see the default scene first.
-  if (const auto it = std::ranges::find(ids, default_scene()); it != ids.end())
+  // Newcomers see the first one.
+  if (const auto it = std::ranges::find(ids, preferred_); it != ids.end())
     std::rotate(ids.begin(), it, it + 1);
   return ids;
 }

@@ -34,7 +34,7 @@ struct SceneListing {
   std::shared_ptr<const WalkableArea> walkable_area{};  // of a loaded one; null: not known yet
 };
 
-/// What the server knows of a scene that it offers.
+/// A scene that the server offers, as far as it is known.
 struct SceneRecord {
   FoundScene found;  // of procedural scenes, only location.given, name and size are set
   std::shared_ptr<const SceneEntry> entry;      // while in memory
@@ -90,7 +90,6 @@ class SceneIndex {
   /// Makes a scene the default one while its file exists. Empty: none was named.
   void prefer(const std::string& id) { preferred_ = id; }
   [[nodiscard]] const std::string& preferred() const { return preferred_; }
-  [[nodiscard]] std::string default_scene() const;
   [[nodiscard]] std::vector<std::string> scene_ids() const;
   /// Any thread. Returns the id of the only scene with this name, or else the name itself. If two
   /// paths have had the name since the start, it stands for neither, because a link by name does

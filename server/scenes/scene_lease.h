@@ -8,7 +8,7 @@
 
 namespace catgs {
 
-/// Who uses a scene in memory.
+/// The users of a scene in memory.
 enum class SceneUse { none, background, visitors };
 
 /// A scene in memory and the background jobs that hold it share this. Thread-safe.

@@ -35,6 +35,11 @@ std::set<std::string> keys_of(const std::vector<std::string>& scenes) {
 /// A quarter of the processors. Trees are built while visitors look.
 int builder_threads(const RendererOptions& core) { return std::max(1, core.pool->threads() / 4); }
 
+/// The renderer that was made first.
+const std::string& renderer_text(const SceneIndex& index) {
+  return index.records().at(index.preferred()).entry->renderer_text;
+}
+
 WalkableAreaSource source_of(const SceneRecord& record, const SceneTrees& trees,
                              const ServerConfig& config) {
   WalkableAreaSource source = walkable_area_source(record.found.location, record.entry->facts);
@@ -72,6 +77,7 @@ SceneLibrary::SceneLibrary(const ServerConfig& config, RendererOptions core, Bac
     open_folders();
   loads_.keep_core();
   memory_.publish();
+  log_info({.event = "renderer"}, "renderer: {}", renderer_text(index_));
 }
 
 /// A bad scene is an operator's mistake that should stop the server.
@@ -93,8 +99,7 @@ void SceneLibrary::pin_scenes() {
     record.pinned = true;
     record.entry = std::move(entry);
     if (index_.preferred().empty()) index_.prefer(id);
-    // The banner shows the first scene's renderer.
-    if (const std::string& text = record.entry->renderer_text; text != renderer_text())
+    if (const std::string& text = record.entry->renderer_text; text != renderer_text(index_))
       log_info({.event = "renderer", .scene = id}, "scene {}: renderer {}", id, text);
   }
 }
@@ -169,11 +174,6 @@ void SceneLibrary::want_walkable_area(const std::string& id) {
   });
 }
 
-std::shared_ptr<const SceneEntry> SceneLibrary::in_memory(const std::string& id) const {
-  const auto it = index_.records().find(id);
-  return it == index_.records().end() ? nullptr : it->second.entry;
-}
-
 void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntry> entry) {
   SceneRecord* const record = index_.find(id);
   if (!record || !record->entry) return;
@@ -194,11 +194,6 @@ void SceneLibrary::merge(std::vector<FoundScene> found) {
     if (!record.found.tree.empty()) trees.insert(record.found.tree);
   trees_.keep(trees);
   memory_.publish();
-}
-
-/// The renderer that was made first.
-std::string SceneLibrary::renderer_text() const {
-  return index_.records().at(index_.preferred()).entry->renderer_text;
 }
 
 }  // namespace catgs

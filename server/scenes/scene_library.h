@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -35,7 +34,6 @@ class SceneLibrary final : public SceneSource {
                boost::asio::io_context& io, Metrics& metrics,
                std::function<TimePoint()> clock = Clock::now);
 
-  [[nodiscard]] std::string default_scene() const override { return index_.default_scene(); }
   [[nodiscard]] std::vector<std::string> scene_ids() const override { return index_.scene_ids(); }
   /// Any thread. See SceneIndex.
   [[nodiscard]] std::string resolve(std::string_view name) const override {
@@ -55,8 +53,6 @@ class SceneLibrary final : public SceneSource {
   }
   void on_tick(TimePoint now) override;
 
-  /// Returns null if the scene is not in memory.
-  [[nodiscard]] std::shared_ptr<const SceneEntry> in_memory(const std::string& id) const;
   /// A background job's hold on a scene in memory, unless that has to leave. `again`: the job had
   /// the scene before, and it is loaded for it where that costs no visitor anything.
   [[nodiscard]] LeasedScene lease(const std::string& id, bool again = false) {
@@ -66,8 +62,6 @@ class SceneLibrary final : public SceneSource {
   /// reloaded since `entry` was made.
   void revise(const std::string& id, std::shared_ptr<const SceneEntry> entry);
 
-  /// The renderer's description for the default scene.
-  [[nodiscard]] std::string renderer_text() const;
   /// Any thread.
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const {
     return index_.listing();

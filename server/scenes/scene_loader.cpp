@@ -93,7 +93,7 @@ void SceneLoader::load(const FoundScene& found, const SceneRepresentation& repre
                        std::function<void(LoadedScene)> then) {
   const bool waits = whom == For::visitors;
   const auto id = jobs_.start_then(
-      lanes::scenes, waits ? Priority::high : Priority::normal,
+      lanes.scenes, waits ? Priority::high : Priority::normal,
       [this, found, representation](const auto& stop) {
         return load_on(found, representation, stop);
       },
@@ -122,7 +122,7 @@ LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneRepresentat
 void SceneLoader::load_poster(const FoundScene& found, const SceneRepresentation& representation,
                               std::function<void(std::optional<Poster>)> then) {
   gives_way_ = jobs_.start_then(
-      lanes::scenes, Priority::normal,
+      lanes.scenes, Priority::normal,
       [this, found, representation](const auto& stop) {
         return poster_of(found, representation, stop);
       },
@@ -145,13 +145,13 @@ SceneLoader::Poster SceneLoader::poster_of(const FoundScene& found,
 }
 
 void SceneLoader::free_later(std::shared_ptr<const SceneEntry> entry) {
-  jobs_.start(lanes::scenes, Priority::high, [entry = std::move(entry)](const auto&) {});
+  jobs_.start(lanes.scenes, Priority::high, [entry = std::move(entry)](const auto&) {});
 }
 
 void SceneLoader::scan(SceneFolders& folders,
                        std::function<void(std::optional<std::vector<FoundScene>>)> then) {
   jobs_.start_then(
-      lanes::scenes, Priority::normal, [&folders](const auto&) { return folders.scan(); },
+      lanes.scenes, Priority::normal, [&folders](const auto&) { return folders.scan(); },
       [then = std::move(then)](Finished<std::vector<FoundScene>> found) {
         if (!found.result)  // a missing mount: its scenes stay offered
           log_warning({.event = "scene_folder_unreadable"}, "{}", found.error);

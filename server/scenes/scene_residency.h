@@ -49,7 +49,7 @@ inline constexpr std::size_t most_scenes_in_pages = 32;
 /// Pure: time comes in, decisions come out. Not thread-safe.
 class SceneResidency {
  public:
-  /// Who uses a scene in memory.
+  /// The users of a scene in memory.
   using UseOf = std::function<SceneUse(const std::string& id)>;
 
   explicit SceneResidency(ResidencyLimits limits) : limits_(limits) {}

@@ -25,8 +25,7 @@ using SceneAnswer = std::variant<std::shared_ptr<const SceneEntry>, SceneAwaited
 class SceneSource {
  public:
   virtual ~SceneSource() = default;
-  /// The scene for clients that name none.
-  [[nodiscard]] virtual std::string default_scene() const = 0;
+  /// The first is for clients that name none.
   [[nodiscard]] virtual std::vector<std::string> scene_ids() const = 0;
   /// Resolves a name to a scene's id. A name that stands for no scene or for several is returned
   /// unchanged.

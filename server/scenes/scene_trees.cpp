@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 constexpr auto retry_after_failure = 30min;
 constexpr auto progress_interval = 30s;  // of the log
 constexpr double assumed_gaussians_per_second = 300e3;
-// Of the Gaussians that a build sorts.
+// The memory for the Gaussians that a build sorts.
 constexpr std::uint64_t least_build_bytes = 256'000'000, most_build_bytes = 1'000'000'000;
 
 int percent(double fraction) { return static_cast<int>(100.0 * fraction); }
@@ -89,7 +89,7 @@ void SceneTrees::order(const FoundScene& scene, bool urgent) {
   ordered->scene = scene;
   changed_ = true;
   ordered->job = jobs_.start_then(
-      lanes::trees, priority,
+      lanes.trees, priority,
       [this, ordered](const std::stop_token& stop) {
         log_info({.event = "tree_building", .scene = ordered->scene.id},
                  "scene {}: building its tree from {}", ordered->scene.id,

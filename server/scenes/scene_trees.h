@@ -53,7 +53,7 @@ class SceneTrees {
   void build_now(const FoundScene& scene);
   /// How long an ordered tree will take, from what is built of it.
   [[nodiscard]] std::chrono::seconds estimate(const FoundScene& scene) const;
-  /// What is done for a scene at the moment, for people: "building tree 37 %". Often empty.
+  /// A scene's state, for people: "building tree 37 %". Often empty.
   [[nodiscard]] std::string state_of(const FoundScene& scene) const;
 
   /// The scene's tree is damaged: removes it. Where that happens again soon, the disk is to blame,

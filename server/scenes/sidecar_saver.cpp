@@ -45,28 +45,28 @@ HttpResponse tagged(int status, std::string text, std::string etag) {
 }  // namespace
 
 SidecarSaver::Request::~Request() {
-  place.reset();  // it is free before the answer comes
+  slot.reset();  // it is free before the answer comes
   promise.set_value(std::move(answer));
 }
 
 std::future<HttpResponse> SidecarSaver::save(std::string scene_id, std::string json,
                                              Precondition precondition,
-                                             std::shared_ptr<const UploadSlot> place) {
+                                             std::shared_ptr<const UploadSlot> slot) {
   const auto request = std::make_shared<Request>();
   request->scene_id = std::move(scene_id);
   request->json = std::move(json);
   request->precondition = std::move(precondition);
-  request->place = std::move(place);
+  request->slot = std::move(slot);
   auto future = request->promise.get_future();
   // Saves run before posters, because those that wait together need only one poster.
-  jobs_.start(lanes::sidecars, Priority::high, [this, request](const std::stop_token& stop) {
+  jobs_.start(lanes.sidecars, Priority::high, [this, request](const std::stop_token& stop) {
     request->answer = answer(*request, stop);
   });
   return future;
 }
 
 HttpResponse SidecarSaver::answer(Request& request, const std::stop_token& stop) {
-  if (request.place->abandoned()) return busy_response("503: the connection is closed\n");
+  if (request.slot->abandoned()) return busy_response("503: the connection is closed\n");
   request.entry =
       ask_session_thread(io_, stop, [&] { return scenes_.lease(request.scene_id).entry; });
   if (!request.entry)
@@ -116,14 +116,14 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   try {
     Replacement fresh(file, request.json, beside_the_scene);
     const FileLock lock = lock_for_saving(file.parent_path(), save_patience,
-                                          [&] { return !request.place->abandoned(); });
+                                          [&] { return !request.slot->abandoned(); });
     // Read it once, because somebody may replace it by hand meanwhile.
     const std::optional<std::string> there = sidecar_text(file);
     const std::string current = there ? etag_of(*there) : "";
     if (!request.precondition.holds(current)) return refuse_outdated(request, there, current);
     auto shown =
         revised(scene, sidecar, request.json, media_origins_);  // throws before any file is changed
-    if (request.place->abandoned()) return {text_response(503, "503: the connection is closed\n")};
+    if (request.slot->abandoned()) return {text_response(503, "503: the connection is closed\n")};
     if (there != request.json) fresh.take_place_and_keep_old();
     log_info({.event = "saved", .scene = request.scene_id},
              "scene {}: an author saved {} ({} bytes)", request.scene_id, file.string(),
@@ -142,7 +142,7 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
 }
 
 void SidecarSaver::remove_stale_files_in(std::set<std::filesystem::path> folders) {
-  jobs_.start(lanes::sidecars, Priority::normal, [folders = std::move(folders)](const auto&) {
+  jobs_.start(lanes.sidecars, Priority::normal, [folders = std::move(folders)](const auto&) {
     for (const std::filesystem::path& folder : folders) {
       remove_stale_files(folder, surely_stale);
       std::error_code error;
@@ -159,7 +159,7 @@ HttpResponse SidecarSaver::apply(const Request& request, const Outcome& outcome)
   const std::string& id = request.scene_id;
   const bool same = same_poster(outcome.revised->facts, request.entry->facts);
   if ((!outcome.revised->poster || !same) && posters_due_.insert(id).second)
-    jobs_.start(lanes::sidecars, Priority::normal,
+    jobs_.start(lanes.sidecars, Priority::normal,
                 [this, id](const std::stop_token& stop) { render_poster(id, stop); });
   scenes_.revise(id, outcome.revised);
   return outcome.answer;

@@ -33,9 +33,9 @@ class SidecarSaver {
   /// the sender's permission. If the sidecar on disk does not meet `precondition`, it is kept and
   /// applied, as another server may have written it. The answer is then 412 with its tag. Servers
   /// that share a folder look at the sidecar and replace it one after the other. Requests run one
-  /// after the other, too; one with an abandoned place is dropped.
+  /// after the other, too; one with an abandoned slot is dropped.
   std::future<HttpResponse> save(std::string scene_id, std::string json, Precondition precondition,
-                                 std::shared_ptr<const UploadSlot> place);
+                                 std::shared_ptr<const UploadSlot> slot);
 
   /// Removes what killed servers have left in these folders and in the media folders there.
   void remove_stale_files_in(std::set<std::filesystem::path> folders);
@@ -50,7 +50,7 @@ class SidecarSaver {
     std::string scene_id{};
     std::string json{};
     Precondition precondition{};
-    std::shared_ptr<const UploadSlot> place{};
+    std::shared_ptr<const UploadSlot> slot{};
     std::shared_ptr<const SceneEntry> entry{};
     std::promise<HttpResponse> promise{};
     HttpResponse answer =

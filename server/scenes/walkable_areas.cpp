@@ -27,7 +27,7 @@ void WalkableAreas::find(const std::string& scene_id, WalkableAreaSource source,
                          std::function<void(std::shared_ptr<const WalkableArea>)> found) {
   busy_ = true;
   jobs_.start_then(
-      lanes::walkable_areas, Priority::normal,
+      lanes.walkable_areas, Priority::normal,
       [this, scene_id, source = std::move(source)](const std::stop_token& stop) {
         return find_now(scene_id, source, stop);
       },

@@ -36,7 +36,7 @@ std::variant<std::string, ErrorMessage> AdmissionController::choose(const Hello&
     const std::vector<std::string> ids = around_.scenes.scene_ids();
     const auto allowed = std::ranges::find_if(
         ids, [&](const std::string& id) { return permit.allows(id, Use::own_session); });
-    wanted = allowed != ids.end() ? *allowed : around_.scenes.default_scene();
+    if (!ids.empty()) wanted = allowed != ids.end() ? *allowed : ids.front();
   }
   // Check the token first, so that a refusal tells nothing about the scenes here.
   if (const auto refusal = permit.refusal(wanted, Use::own_session))

@@ -102,7 +102,7 @@ class Session final : public VisitHost, public std::enable_shared_from_this<Sess
   [[nodiscard]] bool may_be_watched() const;
   [[nodiscard]] std::optional<FrameCandidate> next_frame() const { return visit_.next_frame(); }
   [[nodiscard]] const std::string& id() const { return id_; }
-  /// What log lines about it name. Valid until the visit's next event.
+  /// The facts of log lines about it. Valid until the visit's next event.
   [[nodiscard]] LogFacts facts() const;
   [[nodiscard]] Visit& visit() { return visit_; }
   [[nodiscard]] Audience& audience() { return audience_; }

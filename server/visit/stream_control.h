@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <optional>
-#include <utility>
 
 #include "server/flow/idr_policy.h"
 #include "server/visit/picture_plan.h"

@@ -3,7 +3,7 @@ import path from 'node:path';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { distance, pose_of, settle } from './support/camera';
-import { open_in_firefox, type FirefoxPage } from './support/firefox';
+import { open_in_firefox, start_firefox, type FirefoxPage } from './support/firefox';
 import {
   access_token,
   catgs_render,
@@ -20,6 +20,7 @@ const folder = scratch_folder();
 let server: RunningServer;
 
 beforeAll(async () => {
+  await start_firefox();
   const city = make_demo(folder);
   const streets = path.join(scratch_folder(), 'streets.ply');
   crop_streets(city, streets, -38, 24);

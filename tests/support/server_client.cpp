@@ -69,6 +69,7 @@ ServerConfig quiet_config() {
   config.port = 0;
   config.admin_bind = "off";
   config.threads = 2;
+  config.renderer = RendererKind::cpu;  // whatever this machine has
   return config;
 }
 
@@ -134,7 +135,7 @@ double metric(const RunningServer& server, const std::string& name) {
   return std::stod(text.substr(at + name.size() + 2));
 }
 
-std::string raw_answer(int port, std::string_view request, std::chrono::milliseconds patience) {
+std::string raw_answer(int port, std::string_view request) {
   RawSocket socket(port);
   socket.send(request);
   return socket.receive(patience);

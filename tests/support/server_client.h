@@ -62,9 +62,9 @@ HttpReply http_get(int port, const std::string& target,
 HttpReply http_put(int port, const std::string& target, const std::string& body,
                    const std::map<std::string, std::string>& headers = {});
 
-/// Everything that a server answers to `request`, sent as it is, until it is silent for so long.
-std::string raw_answer(int port, std::string_view request,
-                       std::chrono::milliseconds patience = std::chrono::milliseconds(300));
+/// Everything that a server answers to `request`, sent as it is, until it closes the connection or
+/// is silent for twenty seconds.
+std::string raw_answer(int port, std::string_view request);
 
 /// The value of a gauge or counter without labels.
 double metric(const RunningServer& server, const std::string& name);

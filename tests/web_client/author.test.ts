@@ -1,4 +1,4 @@
-import { afterEach, describe, expect, it, vi } from 'vitest';
+import { describe, expect, it, vi } from 'vitest';
 import { identity } from '#client/base/vector';
 import { Picks } from '#client/session/picks';
 import { nothing_said, TourDraft } from '#client/tour/draft';
@@ -185,9 +185,6 @@ describe('saving to the server', () => {
     (status: number, text: string, headers = {}) =>
     (): Promise<Response> =>
       Promise.resolve(new Response(text, { status, headers }));
-  afterEach(() => {
-    vi.unstubAllGlobals();
-  });
 
   it('sends it with the token, to the scene', async () => {
     const fetched = vi.fn(answered(200, 'saved', { etag: '"2"' }));

@@ -1,5 +1,5 @@
 // The samples that leave the page.
-import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
 import type { CameraController } from '#client/camera/camera_controller';
 import { CameraLoop } from '#client/camera/camera_loop';
 import type { CameraSample } from '#client/camera/eye';
@@ -43,7 +43,6 @@ describe('the camera loop', () => {
     );
     loop.enable();
   });
-  afterEach(() => vi.unstubAllGlobals());
 
   it('says that nothing moves a refresh after the last sample, once, and then stops', () => {
     refresh();

@@ -1,5 +1,5 @@
 import { create } from '@bufbuild/protobuf';
-import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
 import { remember_rung, remembered_rung } from '#client/decode/decoder_memory';
 import { available_codecs, make_decoder } from '#client/decode/make_decoder';
 import type { DecoderRung } from '#client/decode/ladder';
@@ -29,7 +29,6 @@ describe('what is remembered of decoders', () => {
     expect(remembered_rung(storage, 'a', 0)).toBe('prefer-hardware');
     expect(remembered_rung(undefined, 'a', 0)).toBe('prefer-hardware');
     remember_rung('jpeg', undefined, 'a', 0);
-    warned.mockRestore();
   });
 });
 
@@ -55,10 +54,6 @@ describe('the ladder', () => {
         }
       },
     );
-  });
-
-  afterEach(() => {
-    vi.unstubAllGlobals();
   });
 
   const video = create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C01F' });

@@ -1,5 +1,5 @@
 import { create, type MessageInitShape } from '@bufbuild/protobuf';
-import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { beforeEach, describe, expect, it, vi } from 'vitest';
 import type { EncodedFrame } from '#client/decode/picture';
 import { WebCodecsDecoder } from '#client/decode/video_decoder';
 import { Codec, FrameHeaderSchema, StreamConfigSchema, type StreamConfig } from '#client/wire/wire';
@@ -67,10 +67,6 @@ beforeEach(() => {
       failed: () => (failures += 1),
     },
   );
-});
-
-afterEach(() => {
-  vi.unstubAllGlobals();
 });
 
 function browser_decoder(): FakeVideoDecoder {

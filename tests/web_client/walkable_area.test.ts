@@ -283,7 +283,6 @@ describe('a walk map that the server still computes', () => {
   afterEach(() => {
     loader.enter(''); // nobody asks on
     vi.useRealTimers();
-    vi.unstubAllGlobals();
   });
 
   it('is announced once in each scene to those who wait for it', async () => {

@@ -96,7 +96,7 @@ void floors(const FloorsOptions& options, bool quiet) {
   };
   if (std::filesystem::path(options.out).extension() != ".walk")
     throw InputError(options.out, "", "is not the name of a .walk file",
-                     "the server reads the ground of hall.ply from hall.walk");
+                     "the server reads the walkable area of hall.ply from hall.walk");
   check_writable(options.out);
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const auto begin = Clock::now();

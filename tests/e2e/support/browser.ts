@@ -55,6 +55,7 @@ interface Tab {
   readonly page: Page;
   readonly kind: string;
   readonly is_prepared: boolean; // by a script that nothing takes out again
+  readonly origins: Set<string>; // of the documents since it was emptied; each has its storage
 }
 
 const used: Tab[] = [];
@@ -67,7 +68,7 @@ const kind_of = (options: BrowserContextOptions): string =>
   JSON.stringify({ ...options, viewport: 0, colorScheme: 0, reducedMotion: 0 });
 
 /** Takes what the test has left in the page: listeners, routes, settings, and its visit. */
-async function empty({ page }: Tab): Promise<void> {
+async function empty({ page, origins }: Tab): Promise<void> {
   for (const event of ['console', 'pageerror', 'request'] as const) page.removeAllListeners(event);
   await page.unrouteAll({ behavior: 'ignoreErrors' });
   for (const other of page.context().pages()) if (other !== page) await other.close();
@@ -78,13 +79,15 @@ async function empty({ page }: Tab): Promise<void> {
         sessionStorage.clear();
       })
       .catch(() => undefined); // a frame without an origin has no storage
+  origins.clear();
   await page.goto('about:blank');
   await page.mouse.move(0, 0);
 }
 
 /** Empties it for the next test, or closes it where that is not enough. */
 async function give_back(tab: Tab, is_reusable: boolean): Promise<void> {
-  if (!is_reusable || tab.is_prepared || tab.page.isClosed()) return tab.page.context().close();
+  const is_dirty = tab.is_prepared || tab.origins.size > 1 || tab.page.isClosed();
+  if (!is_reusable || is_dirty) return tab.page.context().close();
   await empty(tab);
   free.push(tab);
 }
@@ -114,7 +117,11 @@ async function make_tab(
   browser ??= launch_browser();
   const context = await (await browser).newContext(options);
   if (prepare) await context.addInitScript(prepare);
-  return { page: await context.newPage(), kind, is_prepared: prepare !== undefined };
+  const origins = new Set<string>();
+  context.on('request', (request) => {
+    if (request.isNavigationRequest()) origins.add(new URL(request.url()).origin);
+  });
+  return { page: await context.newPage(), kind, is_prepared: prepare !== undefined, origins };
 }
 
 /** Does something in a page, and returns what that returns. */

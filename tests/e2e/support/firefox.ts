@@ -3,7 +3,6 @@ import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import path from 'node:path';
-import { afterEach, beforeAll } from 'vitest';
 import { WebSocket } from 'ws';
 import type { AnyPage } from './camera';
 import { clean_up } from './clean_up';
@@ -36,16 +35,14 @@ export interface FirefoxPage extends AnyPage {
 let firefox: Command;
 const errors_of = new Map<string | undefined, string[]>(); // by context
 
-beforeAll(async () => {
-  firefox = await start();
-});
+/** Starts the Firefox that all tests of a file share, before them. */
+export async function start_firefox(): Promise<void> {
+  firefox = await connect(await launch());
+  await firefox('session.new', { capabilities: {} });
+  await firefox('session.subscribe', { events: ['log.entryAdded'] });
+}
 
-afterEach(async () => {
-  for (const context of errors_of.keys()) await firefox('browsingContext.close', { context });
-  errors_of.clear();
-});
-
-/** Opens the address in a tab that is closed after the test, in a Firefox that all tests of a file share. */
+/** Opens the address in a tab that is closed after the test. */
 export async function open_in_firefox(
   url: string,
   width: number,
@@ -56,16 +53,10 @@ export async function open_in_firefox(
   };
   const errors: string[] = [];
   errors_of.set(context, errors);
+  clean_up(() => firefox('browsingContext.close', { context }));
   await firefox('browsingContext.setViewport', { context, viewport: { width, height } });
   await firefox('browsingContext.navigate', { context, url, wait: 'complete' });
   return page_of(firefox, context, errors);
-}
-
-async function start(): Promise<Command> {
-  const command = await connect(await launch());
-  await command('session.new', { capabilities: {} });
-  await command('session.subscribe', { events: ['log.entryAdded'] });
-  return command;
 }
 
 function page_of(command: Command, context: string, errors: string[]): FirefoxPage {

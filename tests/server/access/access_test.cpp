@@ -222,6 +222,8 @@ TEST_F(AccessTest, APipeInPlaceOfAListIsNotWaitedFor) {
   EXPECT_TRUE(refusal(access, lost, "city", 0));
   EXPECT_FALSE(refusal(access, "alpha-alpha", "city", 0)) << "those read before stay in force";
   EXPECT_EQ(test::refused_field([&] { AccessControl(tokens, {}); }), "--token-file");
+  EXPECT_THAT([&] { read_key_file("--token-key-file", tokens); },
+              ThrowsMessage<InputError>(HasSubstr("it is not a regular file")));
 }
 
 TEST_F(AccessTest, AListThatCannotBeReadNowIsReadLater) {

@@ -261,7 +261,7 @@ TEST_F(BackgroundTest, DiskIsNotAskedForThoseWhoHaveGone) {
   auto gone = std::make_shared<Waiter>();
   std::atomic<int> done{0};
   DiskJobs disk(background_, std::make_shared<LwsWaker>());
-  for (std::size_t i = 0; i < lanes::disk.threads; ++i) hold(Priority::normal, lanes::disk);
+  for (std::size_t i = 0; i < lanes.disk.threads; ++i) hold(Priority::normal, lanes.disk);
   const std::function<int()> work = [&] { return ++done; };
   auto dropped = disk.run(work, gone);
   auto result = disk.run(work, waiter);

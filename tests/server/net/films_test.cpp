@@ -96,8 +96,7 @@ TEST_F(Films, DeleteCancelsTheJob) {
   const std::string job = "/api/films/" + job_of(order(film, author));
   const auto send_delete = [&](const std::string& path, const std::string& headers = "") {
     return raw_answer(server->port(),
-                      "DELETE " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n",
-                      20s);
+                      "DELETE " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n" + headers + "\r\n");
   };
   const auto state = [&] {
     return nlohmann::json::parse(http_get(server->port(), job).body).at("state");

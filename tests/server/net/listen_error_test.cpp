@@ -8,18 +8,18 @@ namespace {
 
 class ListenErrorTest : public testing::Test {
  protected:
-  static void listen(const Endpoint& endpoint) {
+  void listen(const Endpoint& endpoint) {
     NetOptions options;
     options.listen = endpoint;
-    NetServer{std::move(options)};
+    NetServer(std::move(options), background_);
   }
 
+  Background background_;
   const test::CapturedLog log_;
 };
 
 TEST_F(ListenErrorTest, NamesABusyPortAndWhatToDo) {
-  NetOptions options;
-  const NetServer first(std::move(options));
+  const NetServer first({}, background_);
   const std::string endpoint = "--bind 127.0.0.1:" + std::to_string(first.port());
   EXPECT_THAT([&] { listen({.address = "127.0.0.1", .port = first.port()}); },
               ThrowsMessage<InputError>(AllOf(StartsWith(endpoint), HasSubstr("another program"),
@@ -34,7 +34,7 @@ TEST_F(ListenErrorTest, NamesFilesThatAreNoCertificateAndKey) {
     NetOptions options;
     options.tls_certificate = certificate;
     options.tls_key = folder.write("key.pem", "no key\n").string();
-    NetServer{std::move(options)};
+    NetServer(std::move(options), background_);
   };
   EXPECT_THAT(listen_with_them,
               ThrowsMessage<InputError>(AllOf(HasSubstr("--tls-cert " + certificate),

@@ -211,7 +211,7 @@ TEST(ServerAccess, ARevokedLinkEndsItsSessionsAndNoOthers) {
 TEST(ServerAccess, ARequestHasOneToken) {
   const auto answer_to = [&](const std::string& headers) {
     return raw_answer(guarded_server().port(),
-                      "GET /api/scenes HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n", 20s);
+                      "GET /api/scenes HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n");
   };
   const std::string one = std::string("Authorization: Bearer ") + static_token + "\r\n";
   EXPECT_THAT(answer_to(one), StartsWith("HTTP/1.1 200 "));
@@ -269,7 +269,7 @@ TEST(ServerAccess, ServesTlsWithTheGivenCertificate) {
     EXPECT_EQ(plain.headers.at("location"),
               "https://127.0.0.1:" + std::to_string(server.port()) + "/?scene=city");
     EXPECT_EQ(http_put(server.port(), "/api/scenes/city/sidecar", "{}").status, 400);
-    EXPECT_THAT(raw_answer(server.port(), handshake(server.port()), 20s), HasSubstr(" 400 "));
+    EXPECT_THAT(raw_answer(server.port(), handshake(server.port())), HasSubstr(" 400 "));
   }
   std::filesystem::remove(key);
   ServerConfig config = quiet_config();

@@ -24,8 +24,8 @@ class Program {
   /// `descriptors`: how many it may have; 0: as many as this process.
   explicit Program(const std::vector<std::string>& more = {}, const std::string& until = "Ctrl-C",
                    rlim_t descriptors = 0) {
-    std::vector<std::string> words = {"catgs-server", "--port",       "0", "--admin-bind",
-                                      "off",          "--drain-wait", "1"};
+    std::vector<std::string> words = {"catgs-server", "--port", "0",          "--admin-bind", "off",
+                                      "--drain-wait", "1",      "--renderer", "cpu"};
     words.insert(words.end(), more.begin(), more.end());
     if (std::ranges::count(more, "--scene") + std::ranges::count(more, "--scene-folder") == 0)
       words.insert(words.begin() + 1, {"synth:city:2000", "synth:city:2000"});  // one scene

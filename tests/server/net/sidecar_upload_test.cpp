@@ -185,11 +185,10 @@ TEST_F(SidecarUpload, SaysWhereNothingCanBeWrittenAndNamesNoFolder) {
   EXPECT_EQ(http_put(server->port(), "/api/scenes/garden/sidecar", "{}", bearer(author)).status,
             409)
       << "a generated scene has no file";
-  // Where the sidecar should be is a folder: as good as a folder that is read-only.
   std::filesystem::create_directories(file / "inside");
   const HttpReply taken = put(author);
   EXPECT_EQ(taken.status, 409);
-  EXPECT_THAT(taken.body, AllOf(HasSubstr(hall + ".json"), HasSubstr("download the file"),
+  EXPECT_THAT(taken.body, AllOf(HasSubstr(hall + ".json"), HasSubstr("have the folder removed"),
                                 Not(HasSubstr(folder->path().string()))));
 }
 
@@ -200,8 +199,11 @@ TEST_F(SidecarUpload, BeyondItsSlotsIsAskedToComeAgain) {
     slow.back().send(head(by, sidecar.size()) + std::string(sidecar.substr(1)));
   };
   const std::string others[] = {make_link("author", "", "22"), make_link("author", "", "33")};
-  for (std::size_t i = 0; i < UploadSlots::small.of_a_link; ++i) begin(author);
-  ASSERT_TRUE(eventually([&] { return put(author).status == 503; }));
+  // A slot is free a little after its answer.
+  ASSERT_TRUE(eventually([&] {
+    begin(author);
+    return put(author).status == 503;
+  }));
   const HttpReply refused = put(author);
   EXPECT_EQ(refused.headers.at("retry-after"), "1");
   EXPECT_EQ(refused.headers.at("connection"), "close");
@@ -209,7 +211,6 @@ TEST_F(SidecarUpload, BeyondItsSlotsIsAskedToComeAgain) {
   EXPECT_EQ(put(others[0]).status, 200) << "there are places that one link cannot have";
   EXPECT_GE(metric(*server, "catgs_uploads_refused_total"), 2.0);
 
-  // The place of the last one is free a little after its answer.
   ASSERT_TRUE(eventually([&] {
     begin(others[0]);
     return put(others[1]).status == 503;

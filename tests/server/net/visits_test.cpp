@@ -31,8 +31,7 @@ class Visits : public testing::Test {
     folder.reset();
   }
   static std::string answer(const std::string& request_line) {
-    return raw_answer(server->admin_port(), request_line + "\r\nHost: 127.0.0.1\r\n\r\n",
-                      std::chrono::seconds(1));
+    return raw_answer(server->admin_port(), request_line + "\r\nHost: 127.0.0.1\r\n\r\n");
   }
 
   static inline std::unique_ptr<TemporaryFolder> folder;

@@ -70,6 +70,9 @@ TEST_F(SceneLeaseTest, LoadForABackgroundJobGivesWay) {
   let_a_leave();
   std::promise<void> mount;
   hang_when_released("b", mount);
+  tick(1s);
+  library_->want(id("c"), now_);
+  tick(60s);
   EXPECT_FALSE(lease("a", true).lease);
   EXPECT_FALSE(in_memory("b")) << "it leaves for the job";
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(awaited("b")) << "a visitor asks again";

@@ -36,11 +36,18 @@ class LibraryTest : public FolderTest {
     ASSERT_TRUE(holds());
   }
   std::string id(const std::string& name) const { return library_->resolve(name); }
-  Entry entry(const std::string& name) const { return library_->in_memory(id(name)); }
+  bool in_memory(const std::string& name) const {
+    const auto listing = library_->listing();
+    return std::ranges::any_of(
+        *listing, [&](const auto& scene) { return scene.id == id(name) && scene.loaded; });
+  }
+  Entry entry(const std::string& name) const {
+    return in_memory(name) ? std::get<Entry>(library_->want(id(name), now_)) : nullptr;
+  }
   /// As a visitor does, who asks with each tick.
   Entry visit(const std::string& name) {
     run_until([&] { return std::holds_alternative<Entry>(library_->want(id(name), now_)); });
-    return entry(name);
+    return std::get<Entry>(library_->want(id(name), now_));
   }
   bool awaited(const std::string& name) {
     return std::holds_alternative<SceneAwaited>(library_->want(id(name), now_));
@@ -91,7 +98,6 @@ class SceneLibraryTime : public LibraryTest {
     for (const std::string& id : library_->scene_ids()) names.emplace_back(name_in(id));
     return names;
   }
-  bool in_memory(const std::string& name) const { return entry(name) != nullptr; }
   ErrorMessage refusal(const std::string& name) {
     const auto answer = library_->want(id(name), now_);
     const auto* error = std::get_if<ErrorMessage>(&answer);

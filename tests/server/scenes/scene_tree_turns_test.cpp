@@ -14,7 +14,7 @@ TEST_F(SceneTreesTest, TreeThatVisitorsWaitForComesFirst) {
   start();
   std::promise<void> go;
   Background::Jobs others(background_);
-  others.start(lanes::trees, Priority::high, [&](const auto&) { go.get_future().wait(); });
+  others.start(lanes.trees, Priority::high, [&](const auto&) { go.get_future().wait(); });
   visit("large");
   library_->on_tick(now_);
   EXPECT_THAT(state("large"), HasSubstr("waits")) << "it is shown as a whole meanwhile";

@@ -33,10 +33,13 @@ class SidecarSaverTest : public FolderTest {
         io_, metrics_);
     saver_ = std::make_unique<SidecarSaver>(*library_, background_, io_);
     hall_ = library_->resolve("hall");
-    scene_ = library_->in_memory(hall_);
+    scene_ = entry();
     posters_.insert(scene_->poster);
   }
   void TearDown() override { saver_.reset(); }
+  std::shared_ptr<const SceneEntry> entry() const {
+    return std::get<std::shared_ptr<const SceneEntry>>(library_->want(hall_, Clock::now()));
+  }
 
   /// The scene stays as it is until run_until() runs the session thread's handlers.
   Saved save(const std::string& json, const std::string& if_match = "") {
@@ -46,7 +49,7 @@ class SidecarSaverTest : public FolderTest {
   void run_until(const std::function<bool()>& holds) {
     for (int i = 0; i < 20'000 && !holds(); ++i) {
       io_.restart();
-      while (io_.poll_one() > 0) posters_.insert(library_->in_memory(hall_)->poster);
+      while (io_.poll_one() > 0) posters_.insert(entry()->poster);
       std::this_thread::sleep_for(1ms);
     }
     ASSERT_TRUE(holds());
@@ -56,7 +59,7 @@ class SidecarSaverTest : public FolderTest {
     std::promise<void> done;
     auto last = done.get_future();
     Background::Jobs jobs(background_);
-    jobs.start(lanes::sidecars, Priority::low, [&](const auto&) { done.set_value(); });
+    jobs.start(lanes.sidecars, Priority::low, [&](const auto&) { done.set_value(); });
     run_until([&] { return last.wait_for(0s) == std::future_status::ready; });
   }
   [[nodiscard]] std::string on_disk() const {
@@ -93,7 +96,7 @@ TEST_F(SidecarSaverTest, ARefusalChangesNothingAndRendersNothing) {
   EXPECT_EQ(stale.get().status, 412);
   EXPECT_EQ(wrong.get().status, 400);
   run_all();
-  EXPECT_EQ(library_->in_memory(hall_), scene_);
+  EXPECT_EQ(entry(), scene_);
 }
 
 TEST_F(SidecarSaverTest, ABrokenFileIsNotReplacedUnseen) {
@@ -102,7 +105,7 @@ TEST_F(SidecarSaverTest, ABrokenFileIsNotReplacedUnseen) {
   run_until([&] { return is_ready(stale); });
   EXPECT_EQ(stale.get().status, 412);
   EXPECT_EQ(on_disk(), "{broken");
-  EXPECT_EQ(library_->in_memory(hall_), scene_);
+  EXPECT_EQ(entry(), scene_);
 }
 
 TEST_F(SidecarSaverTest, SavesThatWaitTogetherGetOnePoster) {
@@ -111,8 +114,8 @@ TEST_F(SidecarSaverTest, SavesThatWaitTogetherGetOnePoster) {
   run_until([&] { return is_ready(saves.back()); });
   for (Saved& answer : saves) EXPECT_EQ(answer.get().status, 200);
   EXPECT_EQ(on_disk(), sidecar_at(3));
-  EXPECT_FLOAT_EQ(library_->in_memory(hall_)->facts.start_pose.position.z, 3.0f);
-  run_until([&] { return library_->in_memory(hall_)->poster != scene_->poster; });
+  EXPECT_FLOAT_EQ(entry()->facts.start_pose.position.z, 3.0f);
+  run_until([&] { return entry()->poster != scene_->poster; });
   run_all();
   EXPECT_EQ(posters_.size(), 2u) << "the one before, and one";
 }
@@ -122,18 +125,18 @@ TEST_F(SidecarSaverTest, ToursAloneNeedNoPoster) {
   run_until([&] { return is_ready(tours); });
   EXPECT_EQ(tours.get().status, 200);
   run_all();
-  EXPECT_THAT(*library_->in_memory(hall_)->tours.for_viewers, HasSubstr("Hall"));
+  EXPECT_THAT(*entry()->tours.for_viewers, HasSubstr("Hall"));
   EXPECT_EQ(posters_.size(), 1u);
 }
 
 TEST_F(SidecarSaverTest, SavedTextsAreShownAtOnce) {
   Saved said = save(R"({"title": "The hall", "credits": "Ada", "background": "#ffffff"})");
-  run_until([&] { return library_->in_memory(hall_)->poster != scene_->poster; });
+  run_until([&] { return entry()->poster != scene_->poster; });
   EXPECT_EQ(said.get().status, 200);
   const auto shown = [&] { return library_->listing()->front(); };
   EXPECT_EQ(shown().title, "The hall");
   EXPECT_EQ(shown().about.credits, "Ada");
-  EXPECT_EQ(library_->in_memory(hall_)->facts.about.background_rgb, 0xffffffu);
+  EXPECT_EQ(entry()->facts.about.background_rgb, 0xffffffu);
   Saved nothing = save("{}");
   run_until([&] { return is_ready(nothing); });
   EXPECT_EQ(shown().title, "hall") << "its name again";

@@ -169,7 +169,7 @@ TEST_F(WalkableAreasTest, AChangedSceneGetsItsOwnArea) {
   now_ += 31s;
   run_until([&] { return listed() && !listed()->file; });
   seen.reset();  // the last visitor of the old one leaves
-  run_until([&] { return !library_->in_memory(id()); });
+  run_until([&] { return !in_memory("a"); });
   EXPECT_EQ(listed(), nullptr);
   load();
   EXPECT_NE(found()->file, nullptr);
@@ -180,7 +180,7 @@ TEST_F(WalkableAreasTest, ATreeIsReadPartByPart) {
   config_.gaussians_of_a_tree = 1000;
   start();
   load();
-  run_until([&] { return library_->in_memory(id())->in_pages; });
+  run_until([&] { return entry("a")->in_pages; });
   const SharedArea walkable_area = found();
   ASSERT_NE(walkable_area->file, nullptr);
   EXPECT_TRUE(walk::stand_below(map_in(*walkable_area->file), {6, 3, 2}));

@@ -134,7 +134,6 @@ class OneScene final : public SceneSource {
     *attic_ = *scene_;
     attic_->facts.scene_id = "attic";
   }
-  [[nodiscard]] std::string default_scene() const override { return "scene"; }
   [[nodiscard]] std::vector<std::string> scene_ids() const override { return ids; }
   [[nodiscard]] bool has(const std::string&) const override { return true; }
   SceneAnswer want(const std::string& id, TimePoint) override {
