@@ -21,7 +21,7 @@ test_packages=(libgtest-dev libgmock-dev python3 shellcheck cppcheck clang-forma
 # runc and kubectl often come from elsewhere, and those conflict with the packages.
 deploy_test_packages=(
   podman buildah netavark aardvark-dns iptables catatonit uidmap xz-utils iproute2
-  prometheus python3-yaml docker.io docker-compose
+  prometheus python3-yaml docker.io docker-compose nginx-light caddy openssl
 )
 command -v runc >/dev/null || deploy_test_packages+=(runc)
 

@@ -32,6 +32,7 @@ void FramePath::changed(Session& session) {
 /// 2. Due frames start while a slot is free, the most urgent first.
 void FramePath::start_due() {
   TimePoint now = Clock::now();
+  scheduler_.set_slots(executor_->slots());
   for (; const auto turn = scheduler_.take(now); now = Clock::now()) draw(*turn, now);
   const auto next = scheduler_.next_ready();
   if (next == wakes_at_) return;

@@ -152,7 +152,7 @@ Server::Server(const ServerConfig& config, const ServerParts& parts)
   PoolExecutor::Pools pools{s.core.pool};
   for (const auto& [device, views] : s.core.devices->views())
     pools.render.emplace(device, std::make_shared<ThreadPool>(render_threads_per_gpu));
-  options.cpus = s.core.pool->threads();
+  options.cpus = cpus_for(s.core.pool, s.config.threads);
   options.on_tick = [&s] { s.liveness.session_moved(); };
   std::shared_ptr<FrameExecutor> executor = std::make_shared<PoolExecutor>(std::move(pools));
   if (parts.wrap) executor = parts.wrap(std::move(executor));

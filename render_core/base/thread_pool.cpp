@@ -6,15 +6,11 @@
 #include <exception>
 #include <utility>
 
-#include <sched.h>
+#include "render_core/base/cpu_limit.h"
 
 namespace catgs {
 
-int processors() {
-  cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof(allowed), &allowed) == 0) return CPU_COUNT(&allowed);
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
+int processors() { return threads_for(CpuLimit().cpus()); }
 
 struct ThreadPool::Loop {
   Loop(std::size_t n, BodyRef f) : count(n), body(f) {}
@@ -39,9 +35,23 @@ struct ThreadPool::Loop {
 
 ThreadPool::ThreadPool(int threads) : threads_(threads > 0 ? threads : processors()) {
   assert(threads >= 0);
-  workers_.reserve(static_cast<std::size_t>(threads_));
-  for (int i = 0; i < threads_; ++i)
-    workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+  start_workers();
+}
+
+void ThreadPool::start_workers() {
+  for (int i = static_cast<int>(workers_.size()); i < threads_; ++i)
+    workers_.emplace_back([this, i](const std::stop_token& stop) { work(stop, i); });
+}
+
+void ThreadPool::set_threads(int threads) {
+  assert(threads > 0);
+  {
+    const std::lock_guard lock(mutex_);
+    threads_ = threads;
+  }
+  start_workers();
+  resting_.notify_all();
+  wake_.notify_all();
 }
 
 ThreadPool::~ThreadPool() {
@@ -84,10 +94,13 @@ ThreadPool::Loop* ThreadPool::loop_to_help() const {
   return loop == loops_.end() ? nullptr : *loop;
 }
 
-void ThreadPool::work(const std::stop_token& stop) {
+void ThreadPool::work(const std::stop_token& stop, int index) {
   std::unique_lock lock(mutex_);
   for (;;) {
-    wake_.wait(lock, stop, [this] { return !tasks_.empty() || loop_to_help() != nullptr; });
+    if (!resting_.wait(lock, stop, [&] { return index < threads_; })) return;
+    wake_.wait(lock, stop,
+               [&] { return index >= threads_ || !tasks_.empty() || loop_to_help() != nullptr; });
+    if (index >= threads_) continue;
     if (!tasks_.empty()) {
       auto task = std::move(tasks_.front());
       tasks_.pop_front();

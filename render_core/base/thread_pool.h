@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -10,8 +11,7 @@
 
 namespace catgs {
 
-/// The processors that this process may run on, not all of the machine.
-/// std::thread::hardware_concurrency() counts the whole machine with glibc 2.35 and later.
+/// The threads that this process can keep busy: see CpuLimit.
 int processors();
 
 /// Threads shared by rendering and encoding. Work is parallel across tasks first: only workers that
@@ -27,6 +27,9 @@ class ThreadPool {
   ThreadPool& operator=(const ThreadPool&) = delete;
 
   [[nodiscard]] int threads() const { return threads_; }
+  /// Lets at most `threads` (1 or more) run from now on, and starts those that are missing. Running
+  /// tasks end where they are. A loop may meet both numbers, so read threads() once for each use.
+  void set_threads(int threads);
 
   /// Runs `task` on a worker. Tasks start in the order of submission.
   void submit(std::function<void()> task);
@@ -51,11 +54,13 @@ class ThreadPool {
   struct Loop;
   void run_loop(std::size_t count, BodyRef body);
   [[nodiscard]] Loop* loop_to_help() const;  // mutex held
-  void work(const std::stop_token& stop);
+  void start_workers();
+  void work(const std::stop_token& stop, int index);
 
-  int threads_;
+  std::atomic<int> threads_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
+  std::condition_variable_any resting_;  // workers beyond threads_, which wake_ must not meet
   std::deque<std::function<void()>> tasks_;
   std::vector<Loop*> loops_;  // loops with indices left, oldest first; owned by their callers
   std::vector<std::jthread> workers_;

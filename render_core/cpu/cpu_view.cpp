@@ -104,7 +104,7 @@ void CpuView::draw_boxes(const Camera& camera, FrameStats& stats) {
   StageClock clock(stats);
   const FramePlan plan{.window_end = camera};
   cull_clusters(camera, plan);
-  project(camera, plan, [](std::size_t, std::size_t) {});
+  project(camera, plan, segments(), [](std::size_t, std::size_t) {});
   clock.end(Stage::project);
   lists_.build_by_keys(table(plan), tiles_, settings_.max_list_entries, *scene_->pool);
   clock.end(Stage::sort);
@@ -119,9 +119,10 @@ void CpuView::draw_lists(const FrameRequest& request, const FramePlan& plan, Fra
   } else {
     cull_clusters(camera, plan);
   }
-  lists_.begin(tiles_, segments(), settings_.max_list_entries);
+  const std::size_t shares = segments();
+  lists_.begin(tiles_, shares, settings_.max_list_entries);
   // Listed while the splats are in cache. Reading them again would cost as much as the listing.
-  project(camera, plan, [&](std::size_t segment, std::size_t rank) {
+  project(camera, plan, shares, [&](std::size_t segment, std::size_t rank) {
     lists_.add(segment, table(plan).of_cluster(rank), scene_->kernels);
   });
   clock.end(Stage::project);
@@ -197,9 +198,10 @@ ClusterColours CpuView::colours_of(std::size_t rank, const Camera& camera) {
                               camera.world_from_camera.position);
 }
 
-/// Projects the visible clusters and calls done(share, rank) after each.
+/// Projects the visible clusters in `shares` and calls done(share, rank) after each.
 template <class Done>
-void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& done) {
+void CpuView::project(const Camera& camera, const FramePlan& plan, std::size_t shares,
+                      const Done& done) {
   const bool sweeps = plan.window > 0;
   const std::size_t ranks = clusters_.size(), slots = ranks * cluster_size;
   grow(splats_, slots);
@@ -210,7 +212,6 @@ void CpuView::project(const Camera& camera, const FramePlan& plan, const Done& d
   // A key frame of the paper without a window is an exact frame.
   const bool is_exact = settings_.pipeline == Pipeline::paper && !sweeps;
   const float min_depth = speculation_min_depth(settings_.speculation, camera.near_z);
-  const std::size_t shares = segments();
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;

@@ -52,7 +52,7 @@ class CpuView final : public View {
   void cull_clusters(const Camera& camera, const FramePlan& plan);
   void cut_tree(const FrameRequest& request, const FramePlan& plan);
   template <class Done>
-  void project(const Camera& camera, const FramePlan& plan, const Done& done);
+  void project(const Camera& camera, const FramePlan& plan, std::size_t shares, const Done& done);
   std::uint64_t blend(const FrameRequest& request);
   void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;

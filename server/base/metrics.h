@@ -99,6 +99,8 @@ class Metrics {
   prometheus::Gauge& target_bits_per_second =
       gauge("catgs_target_bits_per_second",
             "What the links of all live sessions are held to be good for");
+  prometheus::Gauge& processors = gauge(
+      "catgs_processors", "Processors that the server may use, of which a CPU quota is a part");
   prometheus::Gauge& processors_busy =
       gauge("catgs_processors_busy_ratio", "Share of the processors' time that the server takes");
   prometheus::Counter& encoders_refused =

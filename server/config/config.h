@@ -32,7 +32,7 @@ struct ServerConfig {
   std::string client_dir;                     // empty: found beside the program
   RendererKind renderer = RendererKind::automatic;
   std::vector<int> devices;  // of the CUDA core; empty: all
-  int threads = 0;           // 0: one per processor
+  int threads = 0;           // 0: as many as CpuLimit allows
   int lod = -1;              // of scenes with levels; -1: by gaussian_budget
   int gaussian_budget = 0;   // of scenes with levels; 0: no bound
   std::string up = "auto";   // or the name of an axis

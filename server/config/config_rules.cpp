@@ -33,6 +33,16 @@ void check_policy(const ServerConfig& config) {
                      "name fewer sites");
 }
 
+void check_bind(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  const bool has_port = colon != std::string::npos &&
+                        (address.find(':') == colon || address.find("]:") != std::string::npos);
+  if (has_port)
+    throw InputError("--bind " + address, {}, "has a port",
+                     fmt::format("write --bind {} --port {}", address.substr(0, colon),
+                                 address.substr(colon + 1)));
+}
+
 }  // namespace
 
 void validate(const ServerConfig& config, const ConfigSources& sources) {
@@ -57,6 +67,7 @@ void validate(const ServerConfig& config, const ConfigSources& sources) {
   if (config.tls_cert.empty() != config.tls_key.empty())
     throw InputError(config.tls_cert.empty() ? "--tls-cert" : "--tls-key", {}, "is missing",
                      "--tls-cert and --tls-key belong together");
+  check_bind(config.bind);
   if (!is_loopback(config.bind) && !config.asks_for_tokens() && !config.open)
     throw InputError("--bind " + config.bind, {}, "other machines could connect without a token",
                      "give --token-file or --token-key-file, or --open if everybody may");

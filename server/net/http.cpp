@@ -68,6 +68,20 @@ bool is_local(std::string_view name) {
          name.ends_with(".local") || name.ends_with(".internal");
 }
 
+std::string in_lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
+}
+
+/// The authority without the port that browsers leave out for this scheme.
+std::string_view without_usual_port(std::string_view authority, std::string_view scheme) {
+  const std::string_view usual = scheme == "https" ? ":443" : scheme == "http" ? ":80" : "";
+  return authority.ends_with(usual) ? authority.substr(0, authority.size() - usual.size())
+                                    : authority;
+}
+
 /// The host[:port] of "https://a.example:8443"; empty for text that is no origin ("null", "*").
 std::string_view authority_of(std::string_view origin) {
   const auto scheme_end = origin.find("://");
@@ -93,8 +107,11 @@ bool origin_allowed(std::string_view origin, std::string_view host,
   if (origin.empty()) return true;
   if (std::ranges::any_of(allowed, [&](const auto& a) { return a == "*" || a == origin; }))
     return true;
-  const std::string_view authority = authority_of(origin);
-  return !authority.empty() && authority == host;
+  // Proxies and old clients write the usual port, and names in any case.
+  const std::string own = in_lower_case(host), from = in_lower_case(origin);
+  const std::string_view scheme = std::string_view(from).substr(0, from.find("://"));
+  const std::string_view authority = without_usual_port(authority_of(from), scheme);
+  return !authority.empty() && authority == without_usual_port(own, scheme);
 }
 
 bool is_loopback(std::string_view address) {
@@ -110,18 +127,14 @@ void check_origin(std::string_view text, bool any_subdomain) {
     throw std::invalid_argument(
         "\"null\" is every page from a file and every sandboxed frame (serve the page by http, or "
         "give its frame sandbox=\"allow-same-origin\")");
-  std::string lower_case(text);
-  for (char& c : lower_case)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const std::string lower_case = in_lower_case(text);
   const std::string_view whole = lower_case;
   const auto scheme_end = whole.find("://");
   const bool has_scheme = scheme_end != std::string_view::npos;
   const std::string_view scheme = has_scheme ? whole.substr(0, scheme_end) : "https";
   std::string_view authority = has_scheme ? whole.substr(scheme_end + 3) : whole;
   authority = authority.substr(0, authority.find_first_of("/?#"));
-  // Browsers leave the usual port out.
-  const std::string_view usual_port = scheme == "https" ? ":443" : scheme == "http" ? ":80" : "";
-  if (authority.ends_with(usual_port)) authority.remove_suffix(usual_port.size());
+  authority = without_usual_port(authority, scheme);
   std::string_view host = authority;
   if (any_subdomain && host.starts_with("*.")) host.remove_prefix(2);
   if (host.empty() || host.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789.:-_[]") !=
@@ -136,7 +149,8 @@ void check_origin(std::string_view text, bool any_subdomain) {
 
 bool host_allowed(std::string_view host, Names names, const std::vector<std::string>& allowed) {
   if (names == Names::all || host.empty()) return true;
-  const std::string_view name = host_name(host);
+  const std::string lower = in_lower_case(host);
+  const std::string_view name = host_name(lower);
   return is_loopback(name) || (names == Names::local && is_local(name)) ||
          std::ranges::any_of(allowed, [&](const auto& a) {
            return a == "*" || (!name.empty() && host_name(authority_of(a)) == name);

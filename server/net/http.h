@@ -21,7 +21,7 @@ struct HttpRequest {
   std::string_view path;  // decoded, starts with '/', no query
   std::string_view if_none_match;
   bool accepts_gzip = false;
-  std::string_view authorization = {};   // the header, as it came
+  std::string_view token = {};           // empty: none
   std::string_view site = {};            // "https://tours.example:8443": how the client came here
   std::vector<std::string> arguments{};  // of the query: "name=value", decoded
   std::string_view if_match = {};

@@ -61,8 +61,7 @@ int on_upload(lws* wsi, LwsHttpExchange& exchange, std::size_t bytes) {
     return large ? exchange.refuse_body(wsi, *std::move(refusal), service.scratch)
                  : exchange.begin_refused_upload(wsi, *std::move(refusal));
   UploadSlots& slots = large ? service.large_uploads : service.uploads;
-  const std::string link = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  if (auto slot = slots.take(link, limited_as(client_address_of(wsi))))
+  if (auto slot = slots.take(token_of(wsi), limited_as(client_address_of(wsi))))
     return exchange.begin_upload(wsi, slot, bytes);
   site_of(wsi).uploads.on_full();
   return exchange.refuse_body(
@@ -91,7 +90,7 @@ int on_put(lws* wsi, LwsHttpExchange& exchange) {
 int on_request(lws* wsi, HttpSlot& slot) {
   const Site& site = site_of(wsi);
   service_of(wsi).gate.requested(wsi);
-  if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
+  if (const auto refused = refuse_faulty_head(wsi)) return *refused;
   if (lacks_tls(wsi) && !is_get_or_head(wsi))
     return refuse_request(wsi, 400, "this port speaks https");
   // libwebsockets does not parse chunks and would take them for the next request.
@@ -196,7 +195,7 @@ int on_websocket(lws* wsi, lws_callback_reasons reason, WebsocketSlot* slot,
   switch (reason) {
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: {
       const Site& site = site_of(wsi);
-      if (const char* fault = fault_of_head(wsi)) return refuse_request(wsi, 400, fault);
+      if (const auto refused = refuse_faulty_head(wsi)) return *refused;
       // libwebsockets accepts any protocol version and any method.
       if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 ||
           request_header(wsi, WSI_TOKEN_VERSION) != "13")

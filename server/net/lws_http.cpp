@@ -103,6 +103,13 @@ std::string custom_header(lws* wsi, std::string_view name_with_colon) {
   return value;
 }
 
+std::string token_of(lws* wsi) {
+  constexpr std::string_view scheme = "Bearer ";
+  const std::string header = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  return header.starts_with(scheme) ? header.substr(scheme.size())
+                                    : custom_header(wsi, "catgs-token:");
+}
+
 std::optional<std::uint64_t> body_length(lws* wsi) {
   const std::string text = request_header(wsi, WSI_TOKEN_HTTP_CONTENT_LENGTH);
   if (text.empty()) return 0;
@@ -124,11 +131,11 @@ int LwsHttpExchange::begin(lws* wsi, const HttpHandler& handler, const std::stri
                                                           : WSI_TOKEN_GET_URI);
   const std::string if_none_match = request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH);
   const std::string encodings = request_header(wsi, WSI_TOKEN_HTTP_ACCEPT_ENCODING);
-  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  const std::string token = token_of(wsi);
   const std::string range = request_header(wsi, WSI_TOKEN_HTTP_RANGE);
   const std::string if_range = request_header(wsi, WSI_TOKEN_HTTP_IF_RANGE);
-  HttpRequest request{path,          if_none_match, encodings.find("gzip") != std::string::npos,
-                      authorization, site,          query_arguments(wsi)};
+  HttpRequest request{path,  if_none_match, encodings.find("gzip") != std::string::npos,
+                      token, site,          query_arguments(wsi)};
   if (deletes) request.method = HttpMethod::delete_;
   if (!head_only_) {  // RFC 9110: ranges are for GET
     request.range = range;
@@ -152,7 +159,7 @@ LwsHttpExchange::~LwsHttpExchange() {
 
 int LwsHttpExchange::begin_upload(lws* wsi, std::shared_ptr<UploadSlot> slot, std::size_t bytes) {
   path_ = request_header(wsi, WSI_TOKEN_PUT_URI);
-  authorization_ = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
+  token_ = token_of(wsi);
   precondition_ = {request_header(wsi, WSI_TOKEN_HTTP_IF_MATCH),
                    request_header(wsi, WSI_TOKEN_HTTP_IF_NONE_MATCH)};
   slot_ = std::move(slot);
@@ -205,7 +212,7 @@ int LwsHttpExchange::end_body(lws* wsi, const HttpUploads& uploads) {
     serve(wsi);
     return answer(wsi, *std::move(refusal_));
   }
-  HttpRequest request{path_, precondition_.if_none_match, false, authorization_};
+  HttpRequest request{path_, precondition_.if_none_match, false, token_};
   request.if_match = precondition_.if_match;
   request.method = HttpMethod::put;
   lws_rx_flow_control(wsi, 0);  // see AnsweredConnections

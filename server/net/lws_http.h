@@ -83,7 +83,7 @@ class LwsHttpExchange {
 
   // Uploads only. The request's head is gone by the time its body is complete.
   std::string path_;
-  std::string authorization_;
+  std::string token_;
   Precondition precondition_;
   std::shared_ptr<UploadSlot> slot_;
   std::size_t announced_bytes_ = 0;
@@ -101,6 +101,10 @@ class LwsHttpExchange {
 /// Returns a request header that libwebsockets has no token for ("x-forwarded-proto:"), or an empty
 /// string.
 std::string custom_header(lws* wsi, std::string_view name_with_colon);
+
+/// Returns the token of "Authorization: Bearer TOKEN", or else of "catgs-token: TOKEN". Pages send
+/// the latter, because a proxy with a login of its own uses Authorization. Empty: neither.
+std::string token_of(lws* wsi);
 
 /// Returns a request header, or an empty string.
 std::string request_header(lws* wsi, lws_token_indexes token);

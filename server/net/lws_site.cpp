@@ -1,5 +1,6 @@
 #include "server/net/lws_site.h"
 
+#include <algorithm>
 #include <array>
 
 #include <boost/beast/http/rfc7230.hpp>
@@ -92,13 +93,19 @@ int refuse_request(lws* wsi, unsigned status, const char* why) {
   return -1;
 }
 
-const char* fault_of_head(lws* wsi) {
+std::optional<int> refuse_faulty_head(lws* wsi) {
+  std::size_t bytes = 0;
+  for (int token = 0; token < WSI_TOKEN_COUNT; ++token)
+    bytes += static_cast<std::size_t>(
+        std::max(0, lws_hdr_total_length(wsi, static_cast<lws_token_indexes>(token))));
+  if (bytes > max_head_bytes)
+    return refuse_request(wsi, 431, "the request has more than 16 KiB of headers: clear cookies");
   const std::string version = request_header(wsi, WSI_TOKEN_HTTP);
   if (version != "HTTP/1.1" && version != "HTTP/1.0")
-    return "a request line ends with HTTP/1.1 or HTTP/1.0";
+    return refuse_request(wsi, 400, "a request line ends with HTTP/1.1 or HTTP/1.0");
   if (version == "HTTP/1.1" && request_header(wsi, WSI_TOKEN_HOST).empty())
-    return "HTTP/1.1 needs a Host";
-  return nullptr;
+    return refuse_request(wsi, 400, "HTTP/1.1 needs a Host");
+  return std::nullopt;
 }
 
 int confirm_upgrade(lws* wsi) {
@@ -148,8 +155,8 @@ std::optional<HttpResponse> refuse_upload(lws* wsi) {
   if (!host_allowed(wsi, host)) return refuse_host(wsi, host);
   if (auto refusal = refuse_origin(wsi, "upload", host)) return refusal;
   const std::string path = request_header(wsi, WSI_TOKEN_PUT_URI);
-  const std::string authorization = request_header(wsi, WSI_TOKEN_HTTP_AUTHORIZATION);
-  HttpRequest request{path, {}, false, authorization};
+  const std::string token = token_of(wsi);
+  HttpRequest request{path, {}, false, token};
   request.method = HttpMethod::put;
   auto refusal = site.uploads.refusal(request);
   if (refusal)

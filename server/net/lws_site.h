@@ -54,10 +54,15 @@ void note_refused_origin(lws* wsi, std::string_view what, const std::string& ori
 /// Answers a request without asking a handler. Nonzero: the connection closes.
 int refuse_request(lws* wsi, unsigned status, const char* why);
 
-/// Describes a fault of the request's head; null: none. libwebsockets decodes a path before it
-/// looks for the end of its line. By a %0a in the path, a page could therefore replace the version
-/// by a header of its own or hide its Host.
-const char* fault_of_head(lws* wsi);
+/// The headers that libwebsockets knows by name may take so much. It keeps half as much again, for
+/// others and so that somewhat larger heads get an answer. What is still larger is hung up on.
+inline constexpr std::size_t max_head_bytes = 16 * 1024;
+inline constexpr unsigned kept_head_bytes = max_head_bytes * 3 / 2;
+
+/// Refuses a request with a faulty head; nothing: it has none. libwebsockets decodes a path before
+/// it looks for the end of its line. By a %0a in the path, a page could therefore replace the
+/// version by a header of its own or hide its Host.
+std::optional<int> refuse_faulty_head(lws* wsi);
 
 /// The callback's result for a request with an Upgrade header. h2c is refused: its parser lacks our
 /// time limits. libwebsockets would refuse a wrong Connection header of a websocket without an

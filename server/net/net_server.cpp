@@ -169,6 +169,7 @@ NetServer::NetServer(NetOptions options, Background& background)
   if (tls) info.options |= LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT;
   info.user = &s.service;
   info.pt_serv_buf_size = buffer_bytes;
+  info.max_http_header_data2 = kept_head_bytes;
   info.gid = static_cast<gid_t>(-1);
   info.uid = static_cast<uid_t>(-1);
   s.context = lws_create_context(&info);

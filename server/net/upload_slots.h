@@ -33,7 +33,7 @@ class UploadSlots {
 
   explicit UploadSlots(const Bounds& bounds) : bounds_(bounds) {}
 
-  /// Returns null if no slot is free. `link` is the sender's Authorization header.
+  /// Returns null if no slot is free. `link` is the sender's token.
   std::shared_ptr<UploadSlot> take(const std::string& link, const std::string& address);
   [[nodiscard]] std::size_t taken() const;
 

@@ -10,9 +10,7 @@
 namespace catgs {
 
 Permit permit_of(const Authorize& authorize, const HttpRequest& request) {
-  constexpr std::string_view scheme = "Bearer ";
-  const std::string_view header = request.authorization;
-  return authorize(std::string(header.starts_with(scheme) ? header.substr(scheme.size()) : ""));
+  return authorize(std::string(request.token));
 }
 
 HttpResponse json_response(std::shared_ptr<const std::string> body) {

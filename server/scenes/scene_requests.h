@@ -11,7 +11,7 @@
 
 namespace catgs {
 
-/// The permit of the token in "Authorization: Bearer TOKEN"; that of no token if there is none.
+/// The permit of the request's token; that of no token if there is none.
 Permit permit_of(const Authorize& authorize, const HttpRequest& request);
 
 HttpResponse json_response(std::shared_ptr<const std::string> body);

@@ -42,11 +42,17 @@ class FrameScheduler {
   };
 
   /// `devices` is the number of devices that candidates name. With none or one, it has all slots.
-  explicit FrameScheduler(int slots, int devices = 1)
-      : slots_(slots), slots_of_device_(devices > 1 ? (slots + devices - 1) / devices : slots) {}
+  explicit FrameScheduler(int slots, int devices = 1) : devices_named_(devices) {
+    set_slots(slots);
+  }
   FrameScheduler(const FrameScheduler&) = delete;
   FrameScheduler& operator=(const FrameScheduler&) = delete;
 
+  /// Fewer slots stop no frame that runs.
+  void set_slots(int slots) {
+    slots_ = slots;
+    slots_of_device_ = devices_named_ > 1 ? (slots + devices_named_ - 1) / devices_named_ : slots;
+  }
   [[nodiscard]] bool has_free_slot() const { return running_ < slots_; }
   [[nodiscard]] int running() const { return running_; }
 
@@ -135,8 +141,9 @@ class FrameScheduler {
     return first ? first->second : nullptr;
   }
 
-  const int slots_;
-  const int slots_of_device_;
+  const int devices_named_;
+  int slots_ = 0;
+  int slots_of_device_ = 0;
   int running_ = 0;
   std::unordered_map<const Source*, Offer> offers_;
   Line later_;  // not ready yet, by when they are

@@ -41,6 +41,9 @@ class AdmissionBudget {
   /// 0 there is always room.
   AdmissionBudget(Capacity capacity, int min_fps) : capacity_(capacity), min_fps_(min_fps) {}
 
+  /// Above 0.
+  void set_cpus(double cpus) { capacity_.cpus = cpus; }
+
   struct Offer {
     Room room = Room::yes;
     double pixel_share = 1.0;  // of what the newcomer wishes
@@ -82,7 +85,7 @@ class AdmissionBudget {
     return load(sessions).fullest();
   }
 
-  const Capacity capacity_;
+  Capacity capacity_;
   const int min_fps_;
 };
 

@@ -24,8 +24,7 @@ AdmissionController::AdmissionController(const VisitContext& around, const Sessi
     : around_(around),
       sessions_(sessions),
       machine_(machine),
-      budget_({static_cast<double>(around.options.cpus),
-               static_cast<double>(around.devices.views().size())},
+      budget_({machine.cpus(), static_cast<double>(around.devices.views().size())},
               around.options.min_fps),
       queue_(around.options.max_queue) {}
 
@@ -222,6 +221,7 @@ QueuePlace AdmissionController::queue_position(int position) const {
 }
 
 void AdmissionController::on_tick(TimePoint now) {
+  budget_.set_cpus(machine_.cpus());
   grow_pictures();
   if (measuring_ || !queue_told_ || now - *queue_told_ >= speak_at_least_every) admit_waiting(now);
   const auto demanded = demands();

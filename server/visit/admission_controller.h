@@ -59,7 +59,7 @@ class AdmissionController {
   const VisitContext& around_;
   const SessionList& sessions_;
   const MachineUse& machine_;
-  const AdmissionBudget budget_;
+  AdmissionBudget budget_;
   AdmissionQueue queue_;
   int admitted_ = 0;
   bool shut_ = false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <functional>
 #include <numeric>
 
@@ -41,7 +42,7 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings) {
 
 int EffortControl::threads_for(int sessions, glm::ivec2 size_px) const {
   const int by_rows = size_px.y / 16 / least_rows_per_slice;
-  const int of_each = (cpus_ + sessions - 1) / std::max(1, sessions);
+  const int of_each = static_cast<int>(std::ceil(cpus_ / std::max(1, sessions)));
   const int threads = std::clamp(std::min(of_each, by_rows), 1, most_threads);
   return static_cast<int>(std::bit_floor(static_cast<unsigned>(threads)));
 }

@@ -74,8 +74,10 @@ class EffortControl {
     EncoderEffort effort;
   };
 
-  EffortControl(int cpus, Range presets) : cpus_(cpus), presets_(presets) {}
+  EffortControl(double cpus, Range presets) : cpus_(cpus), presets_(presets) {}
 
+  /// Seconds of processor time a second that the server may use, above 0.
+  void set_cpus(double cpus) { cpus_ = cpus; }
   /// The effort of a newcomer. `sessions` counts it, and sessions that encode nothing yet.
   [[nodiscard]] EncoderEffort initial(int sessions, glm::ivec2 size_px) const;
   /// Call it at least twice a second. `busy` is this process's share of the processors' time.
@@ -94,7 +96,7 @@ class EffortControl {
 
   static constexpr std::chrono::seconds least_patience{5};
 
-  const int cpus_;
+  double cpus_;
   const Range presets_;
   double busy_ = 0;            // this and the next two: at the last update()
   double cpus_per_pixel_ = 0;  // mean of a session, at the fastest preset

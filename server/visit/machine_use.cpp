@@ -1,24 +1,48 @@
 #include "server/visit/machine_use.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "render_core/base/cpu_limit.h"
 #include "server/base/log_event.h"
 #include "server/visit/device_loads.h"
 
 namespace catgs {
 
+std::function<double()> cpus_for(std::shared_ptr<ThreadPool> pool, int threads) {
+  return [pool = std::move(pool), threads, limit = CpuLimit()] {
+    const double cpus = limit.cpus();
+    if (threads > 0) return std::min(cpus, static_cast<double>(threads));
+    if (threads_for(cpus) != pool->threads()) pool->set_threads(threads_for(cpus));
+    return cpus;
+  };
+}
+
 MachineUse::MachineUse(const VisitContext& around)
     : around_(around),
-      effort_(around.options.cpus, around.options.presets),
+      cpus_(around.options.cpus()),
+      cpus_read_(Clock::now()),
+      effort_(cpus_, around.options.presets),
       cpu_seconds_charged_(process_cpu_seconds()),
       charged_(Clock::now()) {}
 
 void MachineUse::on_tick(const SessionList& sessions, int admitted, TimePoint now) {
+  follow_cpus(now);
   charge_cpu(sessions, now);
   report_loads(sessions);
   control_effort(sessions, admitted, now);
+  around_.metrics.processors.Set(cpus_);
   around_.metrics.processors_busy.Set(busy_);
+}
+
+void MachineUse::follow_cpus(TimePoint now) {
+  if (now - cpus_read_ < std::chrono::seconds(1)) return;
+  cpus_read_ = now;
+  const double cpus = around_.options.cpus();
+  if (cpus == std::exchange(cpus_, cpus)) return;
+  effort_.set_cpus(cpus);
+  log_info({.event = "cpu_limit"}, "the server may use {:.2f} processors now", cpus);
 }
 
 void MachineUse::charge_cpu(const SessionList& sessions, TimePoint now) {
@@ -28,8 +52,7 @@ void MachineUse::charge_cpu(const SessionList& sessions, TimePoint now) {
       std::chrono::duration<double>(now - std::exchange(charged_, now)).count();
   if (interval_s <= 0) return;
   constexpr double span_s = 1.0;
-  busy_ += (seconds / interval_s / around_.options.cpus - busy_) *
-           (1.0 - std::exp(-interval_s / span_s));
+  busy_ += (seconds / interval_s / cpus_ - busy_) * (1.0 - std::exp(-interval_s / span_s));
   std::vector<double> busy_seconds;
   for (const auto& session : sessions)
     busy_seconds.push_back(session->usage().take_busy_seconds(now));

@@ -26,7 +26,8 @@ struct VisitOptions {
   VisitPolicy policy;
   int max_sessions = 16;
   int min_fps = 10;  // guaranteed by admission; 0: admission only counts sessions
-  int cpus = 1;      // available for encoding
+  /// Seconds of processor time a second that the server may use. It may change.
+  std::function<double()> cpus = [] { return 1.0; };
   EffortControl::Range presets;
   int max_sessions_per_address = 64;  // a museum behind one address
   int max_queue = 64;                 // clients that wait for a slot

@@ -191,7 +191,7 @@ describe('saving to the server', () => {
     expect(await save(fetched)).toEqual({ kind: 'saved', tag: '"2"' });
     expect(fetched.mock.calls[0]).toMatchObject([
       new URL('https://tours.example/api/scenes/old%20hall/sidecar'),
-      { method: 'PUT', headers: { authorization: 'Bearer secret' } },
+      { method: 'PUT', headers: { 'catgs-token': 'secret' } },
     ]);
   });
 

@@ -1,9 +1,11 @@
 #include "render_core/base/thread_pool.h"
 
+#include <algorithm>
 #include <atomic>
 #include <latch>
 #include <numeric>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -61,6 +63,31 @@ TEST(ThreadPool, DestructorFinishesSubmittedTasks) {
     for (int i = 0; i < 50; ++i) pool.submit([&] { ++ran; });
   }
   EXPECT_EQ(ran.load(), 50);
+}
+
+TEST(ThreadPool, AsManyTasksRunAsItIsGivenThreads) {
+  ThreadPool pool(1);
+  pool.set_threads(3);
+  std::latch all_run(3), ended(3);
+  for (int task = 0; task < 3; ++task)
+    pool.submit([&] {
+      all_run.arrive_and_wait();
+      ended.count_down();
+    });
+  ended.wait();
+
+  pool.set_threads(1);
+  std::atomic<int> running{0}, most{0};
+  std::latch done(30);
+  for (int task = 0; task < 30; ++task)
+    pool.submit([&] {
+      most = std::max(most.load(), ++running);
+      std::this_thread::yield();
+      --running;
+      done.count_down();
+    });
+  done.wait();
+  EXPECT_EQ(most.load(), 1);
 }
 
 TEST(ThreadPool, HasAThreadForEachProcessorThatItMayUse) {

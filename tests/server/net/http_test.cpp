@@ -12,6 +12,11 @@ TEST(Origin, OwnPagesAndListedOnesMayConnect) {
   EXPECT_TRUE(origin_allowed("https://a.example", "a.example", {}));
   EXPECT_TRUE(origin_allowed("http://a.example:8080", "a.example:8080", {}));
   EXPECT_FALSE(origin_allowed("http://a.example:8081", "a.example:8080", {}));
+  EXPECT_TRUE(origin_allowed("https://a.example", "A.Example:443", {})) << "behind a proxy";
+  EXPECT_TRUE(origin_allowed("http://a.example:80", "a.example", {}));
+  EXPECT_FALSE(origin_allowed("http://a.example", "a.example:443", {}));
+  EXPECT_FALSE(origin_allowed("https://a.example:80", "a.example", {}));
+  EXPECT_FALSE(origin_allowed("https://:443", "", {}));
   EXPECT_FALSE(origin_allowed("https://evil.example", "a.example", {}));
   EXPECT_FALSE(origin_allowed("https://a.example.evil.example", "a.example", {}));
   EXPECT_FALSE(origin_allowed("null", "a.example", {}));
@@ -52,6 +57,7 @@ TEST(HostAllowed, ForeignNamesAreRefusedUnlessListed) {
       EXPECT_FALSE(host_allowed(host, names, listed)) << host;
     EXPECT_TRUE(host_allowed("a.example", names, listed));
     EXPECT_TRUE(host_allowed("a.example:8443", names, listed));
+    EXPECT_TRUE(host_allowed("A.EXAMPLE", names, listed));
     EXPECT_TRUE(host_allowed("b.example", names, {"https://a.example", "*"}));
   }
   EXPECT_TRUE(host_allowed("evil.example", Names::all, {}));

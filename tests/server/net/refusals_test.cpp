@@ -96,7 +96,7 @@ TEST_F(Refusals, RefusalsByLibwebsocketsAreCounted) {
   for (int i = 0; i < 100; ++i) arguments += "&a";
   double expected = 0.0;
   for (const std::string& request :
-       {"GET /" + line_end + "Cookie: " + std::string(9000, 'c') + "\r\n",
+       {"GET /" + line_end + "Cookie: " + std::string(30000, 'c') + "\r\n",
         "GET /" + arguments + line_end,
         "GET /" + line_end + "Connection: Upgrade\r\nUpgrade: websocket\r\n" +
             "Sec-WebSocket-Protocol: " + std::string(200, 'p') + "\r\n",

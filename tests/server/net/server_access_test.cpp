@@ -216,6 +216,12 @@ TEST(ServerAccess, ARequestHasOneToken) {
   const std::string one = std::string("Authorization: Bearer ") + static_token + "\r\n";
   EXPECT_THAT(answer_to(one), StartsWith("HTTP/1.1 200 "));
   EXPECT_THAT(answer_to(one + one), StartsWith("HTTP/1.1 401 "));
+  // A proxy's own login takes the place of ours.
+  const std::string login = "Authorization: Basic dXNlcjpzZWNyZXQ=\r\n";
+  EXPECT_THAT(answer_to(login), StartsWith("HTTP/1.1 401 "));
+  EXPECT_THAT(answer_to(login + "Catgs-Token: " + static_token + "\r\n"),
+              StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(answer_to("Catgs-Token: guess\r\n"), StartsWith("HTTP/1.1 401 "));
 }
 
 TEST(ServerAccess, PreviewsTellWhatStrangersMaySee) {

@@ -76,6 +76,18 @@ TEST(FrameScheduler, CountsSlots) {
   EXPECT_EQ(take(scheduler, now), &source);
 }
 
+TEST(FrameScheduler, FollowsANumberOfSlotsThatChanges) {
+  Scheduler scheduler(1);
+  Source source{FrameCandidate{now, now}};
+  run(scheduler, source);
+  EXPECT_FALSE(scheduler.has_free_slot());
+  scheduler.set_slots(2);
+  run(scheduler, source);
+  scheduler.set_slots(1);
+  scheduler.frame_ended(*source.frame);
+  EXPECT_FALSE(scheduler.has_free_slot());
+}
+
 TEST(FrameScheduler, AChangeAsksNobodyElse) {
   std::vector<Source> sources(1000);
   Scheduler scheduler(2);

@@ -137,7 +137,7 @@ TEST(AdmissionBudget, CanBeSwitchedOff) {
 }
 
 TEST(AdmissionBudget, TellsHowMuchIsTakenAndHowManyFit) {
-  const AdmissionBudget budget({.cpus = 2, .gpus = 1}, 10);
+  AdmissionBudget budget({.cpus = 2, .gpus = 1}, 10);
   const std::vector present{session(0.04, 0.01), session(0.04, 0.01)};
   EXPECT_NEAR(budget.load(present).cpus, 0.4, 1e-9);
   EXPECT_NEAR(budget.load(present).gpus, 0.2, 1e-9);
@@ -146,6 +146,9 @@ TEST(AdmissionBudget, TellsHowMuchIsTakenAndHowManyFit) {
   EXPECT_EQ(budget.seats({}, 16), 16);
   EXPECT_EQ(budget.seats(std::vector{unknown()}, 16), 16) << "nothing is measured yet";
   EXPECT_EQ(budget.seats(std::vector{session(9.0)}, 16), 1) << "the first is always admitted";
+  budget.set_cpus(0.5);
+  EXPECT_NEAR(budget.load(present).cpus, 1.6, 1e-9);
+  EXPECT_EQ(budget.seats(present, 16), 1);
 }
 
 }  // namespace

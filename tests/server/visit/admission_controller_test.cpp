@@ -10,7 +10,7 @@ using AdmissionControllerTest = SessionsTest;
 
 TEST_F(AdmissionControllerTest, ABurstWaitsForWhatTheFirstOnesCost) {
   options.min_fps = 10;
-  options.cpus = 2;
+  options.cpus = [] { return 2.0; };
   start();
   Visitor& first = join();
   Visitor& second = join();
@@ -40,7 +40,7 @@ struct MeasuredAdmission : SessionsTest {
     for (auto& ms : renderer->frame_ms) ms = frame_ms;
     scenes = OneScene(renderer);
     options.min_fps = 10;
-    options.cpus = 1000;
+    options.cpus = [] { return 1000.0; };
     SessionsTest::start();
   }
   /// Until it is known what frames cost.
@@ -109,9 +109,22 @@ TEST_F(AdmissionControllerTest, NobodyWaitsWithoutEnd) {
   EXPECT_THAT(connection->error->message(), HasSubstr("no place came free"));
 }
 
+TEST_F(AdmissionControllerTest, BudgetFollowsACpuQuotaThatChanges) {
+  std::atomic<double> cpus{2.0};
+  options.cpus = [&] { return cpus.load(); };
+  start();
+  join();
+  move_until([&] { return metrics.cpu_budget_used.Value() > 0.0; });
+  EXPECT_EQ(metrics.processors.Value(), 2.0);
+  const double before = metrics.cpu_budget_used.Value();
+  cpus = 0.02;
+  move_until([&] { return metrics.processors.Value() == 0.02; });
+  move_until([&] { return metrics.cpu_budget_used.Value() > before; });
+}
+
 TEST_F(AdmissionControllerTest, AWaitForMeasurementsIsTold) {
   options.min_fps = 10;
-  options.cpus = 1;
+  options.cpus = [] { return 1.0; };
   options.max_queue = 1;
   start();
   join();

@@ -75,7 +75,7 @@ function send(
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('PUT', address);
-    request.setRequestHeader('authorization', `Bearer ${token}`);
+    request.setRequestHeader('catgs-token', token);
     request.setRequestHeader('if-none-match', '*');
     request.upload.onprogress = ({ loaded, total }) => sent(loaded / Math.max(1, total));
     request.onload = () => {
