@@ -110,6 +110,7 @@ TEST_F(AdmissionControllerTest, NobodyWaitsWithoutEnd) {
 }
 
 TEST_F(AdmissionControllerTest, BudgetFollowsACpuQuotaThatChanges) {
+  options.min_fps = 10;
   std::atomic<double> cpus{2.0};
   options.cpus = [&] { return cpus.load(); };
   start();
