@@ -8,7 +8,7 @@ namespace {
 using std::chrono::microseconds;
 using namespace std::chrono_literals;
 
-// The start rate is one that most links carry. A higher wish has to be proved.
+// The start rate is one that most links carry. A higher request has to be proved.
 constexpr double start_bits_per_s = 10e6;
 constexpr double most_pixels_per_s = 8192.0 * 4320.0 * max_encoded_fps;
 constexpr double least_pixels_per_s = 160.0 * 90.0 * 5.0;
@@ -33,29 +33,29 @@ std::int64_t server_us(TimePoint time) {
   return std::chrono::duration_cast<microseconds>(time.time_since_epoch()).count();
 }
 
-RateController::Limits network_limits(const FlowWish& wish) {
-  const double most = 1e3 * wish.bitrate_kbps;
+RateController::Limits network_limits(const FlowRequest& request) {
+  const double most = 1e3 * request.bitrate_kbps;
   return {1e3 * min_bitrate_kbps, most, std::min(most, start_bits_per_s)};
 }
 
 }  // namespace
 
 FlowControl::FlowControl()
-    : credit_(interval_of(wish_.fps)),
-      network_(network_limits(wish_)),
+    : credit_(interval_of(request_.fps)),
+      network_(network_limits(request_)),
       decoder_({least_pixels_per_s, most_pixels_per_s, most_pixels_per_s}) {}
 
-void FlowControl::set_wish(const FlowWish& wish) {
-  if (wish == wish_) return;
-  if (wish.size_px != wish_.size_px || wish.fps != wish_.fps)
-    ladder_ = QualityLadder(wish.size_px, wish.fps);
+void FlowControl::set_request(const FlowRequest& request) {
+  if (request == request_) return;
+  if (request.size_px != request_.size_px || request.fps != request_.fps)
+    ladder_ = QualityLadder(request.size_px, request.fps);
   if (credit_.base_rtt() == 0us)  // the link is not measured yet
-    network_ = RateController(network_limits(wish));
+    network_ = RateController(network_limits(request));
   else
-    network_.set_limits(network_limits(wish));
-  if (wish.fixed_quality) credit_.set_link_rate(std::nullopt);
-  wish_ = wish;
-  frame_size_px_ = wish.size_px;
+    network_.set_limits(network_limits(request));
+  if (request.fixed_quality) credit_.set_link_rate(std::nullopt);
+  request_ = request;
+  frame_size_px_ = request.size_px;
   apply_interval();
 }
 
@@ -80,7 +80,7 @@ bool FlowControl::acknowledged(const Ack& ack, TimePoint now) {
   }
   // The rest has passed, even if the link's rate was underestimated.
   carried_by_ = std::min(*carried_by_, now + time_on_link(credit_.bytes_in_flight(), now));
-  if (!wish_.fixed_quality) credit_.set_link_rate(network_.rate());
+  if (!request_.fixed_quality) credit_.set_link_rate(network_.rate());
   return true;
 }
 
@@ -145,7 +145,7 @@ void FlowControl::forget_path() {
 
 bool FlowControl::update(TimePoint now) {
   if (!link_seen_ || now - *link_seen_ > link_state_holds) link_.unsent_bytes = 0;
-  if (wish_.fixed_quality) return false;
+  if (request_.fixed_quality) return false;
   const auto delivered = network_.delivered();
   const bool changed = ladder_.update(
       {network_.rate(), decoder_.rate(), delivered && *delivered < unused_share * network_.rate()},
@@ -160,12 +160,12 @@ bool FlowControl::may_send() const {
 }
 
 int FlowControl::bitrate_kbps() const {
-  return wish_.fixed_quality ? wish_.bitrate_kbps : static_cast<int>(network_.rate() * 1e-3);
+  return request_.fixed_quality ? request_.bitrate_kbps : static_cast<int>(network_.rate() * 1e-3);
 }
 
 int FlowControl::still_bitrate_kbps(TimePoint now) const {
-  return wish_.fixed_quality ? wish_.bitrate_kbps
-                             : static_cast<int>(network_.steady_rate(now) * 1e-3);
+  return request_.fixed_quality ? request_.bitrate_kbps
+                                : static_cast<int>(network_.steady_rate(now) * 1e-3);
 }
 
 microseconds FlowControl::time_on_link(std::size_t bytes, TimePoint now) const {
@@ -179,10 +179,10 @@ microseconds FlowControl::standing(TimePoint then) const {
 }
 
 microseconds FlowControl::frame_interval() const {
-  if (wish_.fixed_quality) return interval_of(wish_.fps);
+  if (request_.fixed_quality) return interval_of(request_.fps);
   const double pixels = static_cast<double>(frame_size_px_.x) * frame_size_px_.y;
   const double decoded_fps = std::max(least_paced_fps, decoder_.rate() / pixels);
-  return interval_of(std::min(wish_.fps * ladder_.rung().fps_share, decoded_fps));
+  return interval_of(std::min(request_.fps * ladder_.rung().fps_share, decoded_fps));
 }
 
 microseconds FlowControl::pose_to_photon() const {

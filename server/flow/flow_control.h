@@ -14,14 +14,14 @@
 
 namespace catgs {
 
-/// The upper bounds that a client wishes, within the server's limits.
-struct FlowWish {
+/// The upper bounds that a client asks for, within the server's limits.
+struct FlowRequest {
   glm::ivec2 size_px{16, 16};
   int fps = 1;
   int bitrate_kbps = 1000;
   bool fixed_quality = false;  // no adaptation; credit still bounds frames in flight
 
-  bool operator==(const FlowWish&) const = default;
+  bool operator==(const FlowRequest&) const = default;
 };
 
 /// A still may take 1/13 s (77 ms) of what the link carries. One still that is sharp at once costs
@@ -36,7 +36,7 @@ class FlowControl {
  public:
   FlowControl();
 
-  void set_wish(const FlowWish& wish);
+  void set_request(const FlowRequest& request);
 
   struct SentFrame {
     std::uint64_t frame_id = 0;
@@ -62,7 +62,7 @@ class FlowControl {
 
   /// True: a frame sent now would not merely queue.
   [[nodiscard]] bool may_send() const;
-  /// The encoder's bitrate. The level of the stream allows the wish.
+  /// The encoder's bitrate. The level of the stream allows the request.
   [[nodiscard]] int bitrate_kbps() const;
   /// The bitrate of a still. It is more cautious, because a large frame at a guessed rate makes a
   /// long queue.
@@ -86,7 +86,7 @@ class FlowControl {
   void observe_decoder(const Ack& ack, const CreditWindow::Settled& settled, TimePoint now);
   void apply_interval();
 
-  FlowWish wish_;
+  FlowRequest request_;
   CreditWindow credit_;
   RateController network_;  // bits
   RateController decoder_;  // pixels

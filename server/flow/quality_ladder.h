@@ -11,7 +11,7 @@
 
 namespace catgs {
 
-/// One step of the ladder, as a fraction of the client's wish.
+/// One step of the ladder, as a fraction of the client's request.
 struct Rung {
   double scale = 1.0;      // of width and of height
   double fps_share = 1.0;  // of the frame rate
@@ -39,7 +39,7 @@ class QualityLadder {
   };
 
   QualityLadder() : QualityLadder({16, 16}, 1) {}
-  /// The client's wish is the top of the ladder.
+  /// The client's request is the top of the ladder.
   QualityLadder(glm::ivec2 size_px, int fps);
 
   /// Frames begin again, after a rest.

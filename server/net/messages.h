@@ -95,7 +95,7 @@ struct Present {
   bool on = false;
   std::string name;
   bool pings = false;         // followers may point at places
-  bool tells_places = false;  // the company hears where all in it are
+  bool tells_places = false;  // the participants hear where all of them are
 };
 struct Follow {
   std::string watch_token;  // empty: follow nobody
@@ -108,7 +108,7 @@ struct Reached {
 struct Prepare {
   std::string scene_id;
 };
-/// Somebody in a company points at a place of the scene.
+/// A participant of a shared tour points at a place of the scene.
 struct Ping {
   glm::vec3 place{0.0f};
 };
@@ -232,7 +232,7 @@ struct Drain {
 };
 
 /// The position of a client that waits for a place or for its scene.
-struct QueuePlace {
+struct QueuePosition {
   int position = 1;                 // 1: next
   std::chrono::seconds estimate{};  // of the whole wait
   bool for_scene = false;           // a place is free, but the scene is still loading
@@ -250,7 +250,7 @@ enum class LeadState { leads, away, ended };
 struct Lead {
   LeadState state = LeadState::leads;
   std::string name;
-  std::size_t company = 0;           // who watch or follow
+  std::size_t participants = 0;      // who watch or follow
   std::optional<PoseSample> camera;  // to followers
   bool may_ping = false;             // followers may
   bool elsewhere = false;            // of ended: the leader is in another scene
@@ -262,13 +262,13 @@ struct Pinged {
 };
 
 /// Where a leader, who is the first, and its followers are.
-struct Company {
-  std::vector<glm::vec3> places;
-  bool operator==(const Company&) const = default;
+struct Participants {
+  std::vector<glm::vec3> positions;
+  bool operator==(const Participants&) const = default;
 };
 inline constexpr std::size_t most_told_places = 64;
 
-using ServerMessage = std::variant<Welcome, QueuePlace, StreamConfig, Stats, Heartbeat,
-                                   ErrorMessage, Drain, Picked, Lead, Pinged, Company>;
+using ServerMessage = std::variant<Welcome, QueuePosition, StreamConfig, Stats, Heartbeat,
+                                   ErrorMessage, Drain, Picked, Lead, Pinged, Participants>;
 
 }  // namespace catgs

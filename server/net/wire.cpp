@@ -69,7 +69,7 @@ void fill(const Welcome& welcome, v1::ServerMessage& out) {
   message.set_may_leave(welcome.may_leave);
 }
 
-void fill(const QueuePlace& place, v1::ServerMessage& out) {
+void fill(const QueuePosition& place, v1::ServerMessage& out) {
   auto& message = *out.mutable_queue();
   message.set_position(static_cast<std::uint32_t>(place.position));
   message.set_estimate_s(static_cast<std::uint32_t>(place.estimate.count()));
@@ -127,7 +127,7 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   auto& message = *out.mutable_lead();
   message.set_state(static_cast<v1::Lead::State>(lead.state));
   message.set_name(lead.name);
-  message.set_company(static_cast<std::uint32_t>(lead.company));
+  message.set_company(static_cast<std::uint32_t>(lead.participants));
   message.set_may_ping(lead.may_ping);
   message.set_elsewhere(lead.elsewhere);
   if (!lead.camera) return;
@@ -144,9 +144,9 @@ void fill(const Pinged& pinged, v1::ServerMessage& out) {
   out.mutable_pinged()->set_by_leader(pinged.by_leader);
 }
 
-void fill(const Company& company, v1::ServerMessage& out) {
+void fill(const Participants& participants, v1::ServerMessage& out) {
   auto& message = *out.mutable_company();
-  for (const glm::vec3& place : company.places) fill(place, *message.add_places());
+  for (const glm::vec3& place : participants.positions) fill(place, *message.add_places());
 }
 
 template <typename Body>
@@ -156,7 +156,7 @@ constexpr Topic topic_of<Welcome> = Topic::session;
 template <>
 constexpr Topic topic_of<StreamConfig> = Topic::stream;
 template <>
-constexpr Topic topic_of<QueuePlace> = Topic::place;
+constexpr Topic topic_of<QueuePosition> = Topic::place;
 template <>
 constexpr Topic topic_of<Stats> = Topic::statistics;
 template <>
@@ -166,7 +166,7 @@ constexpr Topic topic_of<Lead> = Topic::leader;
 template <>
 constexpr Topic topic_of<Pinged> = Topic::ping;
 template <>
-constexpr Topic topic_of<Company> = Topic::company;
+constexpr Topic topic_of<Participants> = Topic::participants;
 
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();

@@ -57,7 +57,7 @@ enum class Topic : std::uint8_t {
   clock,
   leader,
   ping,
-  company
+  participants
 };
 
 /// A serialised message on its way to the socket.

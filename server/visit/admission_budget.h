@@ -14,7 +14,7 @@ struct SessionDemand {
   double megapixels = 0;                              // of a frame
   int fps = 60;                                       // nominal
   bool fresh = false;        // admitted lately and moving: its cost is about to be measured
-  double pixel_share = 1.0;  // currently granted share of the pixels that its client wishes
+  double pixel_share = 1.0;  // currently granted share of the pixels that its client asks for
 };
 
 /// Whether one more session fits. `unknown`: the cost of recent sessions is not measured yet.
@@ -28,7 +28,7 @@ enum class Room { yes, no, unknown };
 /// every session keeps a usable frame rate. Decisions use the measured frame costs of the present
 /// sessions. Processors and GPUs are counted separately. Pure.
 ///
-/// A wish for large pictures keeps no other client out. A newcomer gets as many of its pixels as
+/// A request for large pictures keeps no other client out. A newcomer gets as many of its pixels as
 /// fit, down to 320x180. When even 320x180 does not fit, sessions with more than an equal share
 /// give pixels up. They get them back when there is room and no client waits.
 class AdmissionBudget {
@@ -46,7 +46,7 @@ class AdmissionBudget {
 
   struct Offer {
     Room room = Room::yes;
-    double pixel_share = 1.0;  // of what the newcomer wishes
+    double pixel_share = 1.0;  // of what the newcomer asks for
     /// The share of its pixels that each present session keeps; empty: all keep all.
     std::vector<double> kept{};
   };

@@ -55,8 +55,9 @@ std::variant<std::string, ErrorMessage> AdmissionController::choose(const Hello&
 AdmissionBudget::Offer AdmissionController::offer_for(
     const Hello& hello, std::span<const SessionDemand> present) const {
   if (shut_ || admitted_ >= around_.options.max_sessions) return {Room::no};
-  const FlowWish wish = wish_within(around_.options.policy, hello.settings, hello.viewport_px);
-  return budget_.offer(present, {std::nullopt, megapixels(wish.size_px), wish.fps});
+  const FlowRequest request =
+      request_within(around_.options.policy, hello.settings, hello.viewport_px);
+  return budget_.offer(present, {std::nullopt, megapixels(request.size_px), request.fps});
 }
 
 std::vector<Session*> AdmissionController::admitted_sessions() const {
@@ -159,7 +160,7 @@ Admission AdmissionController::let_in(Session& session, const Hello& hello,
       set_pixel_share(*present[i],
                       offer.kept[i] * present[i]->visit().stream().plan().pixel_share());
   const glm::ivec2 size_px =
-      wish_within(around_.options.policy, hello.settings, hello.viewport_px).size_px;
+      request_within(around_.options.policy, hello.settings, hello.viewport_px).size_px;
   Visitor& visitor = session.visitor();
   visitor.encoder = best_encoder(around_.encoders, hello.decoders).value();
   visitor.admitted_at = Clock::now();
@@ -216,7 +217,7 @@ void AdmissionController::admit_waiting(TimePoint now) {
     find_session(sessions_, id)->visit().say(queue_position(++position), now);
 }
 
-QueuePlace AdmissionController::queue_position(int position) const {
+QueuePosition AdmissionController::queue_position(int position) const {
   return {position, measuring_ ? time_to_measure * position : queue_.estimate(position, admitted_)};
 }
 

@@ -25,7 +25,7 @@ class AdmissionController {
   /// server. Room is not checked.
   [[nodiscard]] std::variant<std::string, ErrorMessage> choose(const Hello& hello) const;
   AdmissionAnswer admit(Session& session, const Hello& hello);
-  /// True: admit() would grant this hello at least half of the pixels that it wishes, and nobody
+  /// True: admit() would grant this hello at least half of the pixels that it asks for, and nobody
   /// would wait or give up pixels for it.
   [[nodiscard]] bool has_spare_slot(const Hello& hello) const;
   /// A client said hello. It may need less room than the clients that wait already.
@@ -54,7 +54,7 @@ class AdmissionController {
   /// Gives pixels back where there is room for them.
   void grow_pictures();
   void ask_waiting(TimePoint now);
-  [[nodiscard]] QueuePlace queue_position(int position) const;
+  [[nodiscard]] QueuePosition queue_position(int position) const;
 
   const VisitContext& around_;
   const SessionList& sessions_;

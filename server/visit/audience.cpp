@@ -68,8 +68,8 @@ std::vector<std::uint64_t> Audience::send(OutgoingFrame frame, TimePoint now) {
 void Audience::add(std::shared_ptr<ClientConnection> spectator, Welcome welcome,
                    std::string link_id) {
   spectator->connection().send(wire::serialize(for_spectators(std::move(welcome))));
-  if (const Company& company = tour_.positions_told(); !company.places.empty())
-    spectator->connection().send(wire::serialize(company));
+  if (const Participants& participants = tour_.positions_told(); !participants.positions.empty())
+    spectator->connection().send(wire::serialize(participants));
   spectators_.push_back({std::move(spectator), true, std::move(link_id)});
 }
 

@@ -15,18 +15,19 @@ static_assert(effort_presets[least_still_preset].name == "superfast");
 
 }  // namespace
 
-FlowWish wish_within(const VisitPolicy& policy, const Settings& settings, glm::ivec2 viewport_px) {
+FlowRequest request_within(const VisitPolicy& policy, const Settings& settings,
+                           glm::ivec2 viewport_px) {
   const int fps = settings.max_fps > 0 ? settings.max_fps : policy.default_fps;
   const int kbps =
       settings.max_bitrate_kbps > 0 ? settings.max_bitrate_kbps : policy.default_bitrate_kbps;
-  const glm::ivec2 wish_px = settings.size_px.x > 0 ? settings.size_px : viewport_px;
-  return {frame_size(wish_px, policy.max_pixels), std::min(fps, policy.max_fps),
+  const glm::ivec2 requested_px = settings.size_px.x > 0 ? settings.size_px : viewport_px;
+  return {frame_size(requested_px, policy.max_pixels), std::min(fps, policy.max_fps),
           std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality};
 }
 
 glm::ivec2 still_size_within(const VisitPolicy& policy, const Settings& settings,
                              glm::ivec2 viewport_px) {
-  const glm::ivec2 moving_px = wish_within(policy, settings, viewport_px).size_px;
+  const glm::ivec2 moving_px = request_within(policy, settings, viewport_px).size_px;
   if (settings.fixed_quality || settings.still_size_px.x == 0) return moving_px;
   const glm::ivec2 still_px = frame_size(settings.still_size_px, policy.max_pixels);
   return still_px.x * still_px.y > moving_px.x * moving_px.y ? still_px : moving_px;
@@ -40,7 +41,7 @@ void PicturePlan::begin(const Hello& hello, const EncoderEffort& effort, double 
   update();
 }
 
-void PicturePlan::wish(const Settings& settings, TimePoint now) {
+void PicturePlan::request(const Settings& settings, TimePoint now) {
   if (settings == settings_) return;
   settings_ = settings;
   settings_wait_ = true;
@@ -82,12 +83,12 @@ void PicturePlan::follow_settings(TimePoint now) {
 }
 
 void PicturePlan::update() {
-  FlowWish wish = wish_within(policy_, settings_, viewport_px_);
-  wish.size_px = scaled_size(wish.size_px, std::sqrt(pixel_share_));
-  flow_.set_wish(wish);
-  moving_.size_px = scaled_size(wish.size_px, flow_.ladder().rung().scale);
-  moving_.fps = wish.fps;
-  moving_.bitrate_kbps = wish.bitrate_kbps;
+  FlowRequest request = request_within(policy_, settings_, viewport_px_);
+  request.size_px = scaled_size(request.size_px, std::sqrt(pixel_share_));
+  flow_.set_request(request);
+  moving_.size_px = scaled_size(request.size_px, flow_.ladder().rung().scale);
+  moving_.fps = request.fps;
+  moving_.bitrate_kbps = request.bitrate_kbps;
   apply(effort_, moving_);
   still_size_px_ = still_size_within(policy_, settings_, viewport_px_);
 }

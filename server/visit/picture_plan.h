@@ -13,14 +13,15 @@
 
 namespace catgs {
 
-/// Limits a client's wishes to the policy, for a moving camera.
-FlowWish wish_within(const VisitPolicy& policy, const Settings& settings, glm::ivec2 viewport_px);
-/// The size of a still: the client's wish within the policy.
+/// Limits a client's requests to the policy, for a moving camera.
+FlowRequest request_within(const VisitPolicy& policy, const Settings& settings,
+                           glm::ivec2 viewport_px);
+/// The size of a still: the client's request within the policy.
 glm::ivec2 still_size_within(const VisitPolicy& policy, const Settings& settings,
                              glm::ivec2 viewport_px);
 
-/// Decides how a visit's pictures are encoded. The inputs are the client's wishes, the policy, the
-/// ladder's rung for link and decoder, and the pixels and effort that the server grants. Not
+/// Decides how a visit's pictures are encoded. The inputs are the client's requests, the policy,
+/// the ladder's rung for link and decoder, and the pixels and effort that the server grants. Not
 /// thread-safe.
 class PicturePlan {
  public:
@@ -29,12 +30,13 @@ class PicturePlan {
   void begin(const Hello& hello, const EncoderEffort& effort, double pixel_share);
   /// Takes effect no more often than the policy allows, so that alternating settings open few
   /// encoders.
-  void wish(const Settings& settings, TimePoint now);
+  void request(const Settings& settings, TimePoint now);
   /// Call it at least four times a second.
   void on_tick(TimePoint now);
   /// The encoder uses this effort from the next IDR on.
   void use_effort(const EncoderEffort& effort);
-  /// Limits pictures of a moving camera to this share of the wished pixels, from the next one on.
+  /// Limits pictures of a moving camera to this share of the requested pixels, from the next one
+  /// on.
   void use_pixel_share(double share);
   /// Allows stills larger than pictures in motion. They are allowed until one has failed.
   void allow_larger_stills(bool allowed) { larger_stills_ = allowed; }
@@ -49,7 +51,7 @@ class PicturePlan {
 
  private:
   void follow_settings(TimePoint now);
-  /// Applies all wishes and limits to the next frame.
+  /// Applies all requests and limits to the next frame.
   void update();
 
   const VisitPolicy& policy_;

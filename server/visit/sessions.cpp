@@ -260,11 +260,11 @@ Session* Sessions::host_of(const ClientConnection& follower) {
 void Sessions::tell_positions(Session& host, TimePoint now) {
   SharedTour& tour = host.audience().tour();
   if (!tour.since()) return;
-  Company company;
+  Participants participants;
   const auto add = [&](Session& session) {
     if (const auto& camera = session.audience().tour().camera();
-        camera && company.places.size() < most_told_places)
-      company.places.push_back(camera->world_from_camera.position);
+        camera && participants.positions.size() < most_told_places)
+      participants.positions.push_back(camera->world_from_camera.position);
   };
   if (tour.tells_positions()) {
     add(host);
@@ -272,7 +272,7 @@ void Sessions::tell_positions(Session& host, TimePoint now) {
       if (const auto* visitor = session->audience().visitor(); visitor && tour.has(*visitor))
         add(*session);
   }
-  if (tour.tell(company, now)) host.audience().tell(company, now);
+  if (tour.tell(participants, now)) host.audience().tell(participants, now);
 }
 
 void Sessions::leave(Session& session) {

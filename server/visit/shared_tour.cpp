@@ -18,7 +18,7 @@ constexpr auto between_positions = 500ms;
 constexpr double pings_per_second = 10.0;
 
 bool same_but_for_camera(const Lead& a, const Lead& b) {
-  return a.state == b.state && a.name == b.name && a.company == b.company &&
+  return a.state == b.state && a.name == b.name && a.participants == b.participants &&
          a.may_ping == b.may_ping;
 }
 
@@ -100,12 +100,12 @@ bool SharedTour::ping(const Pinged& pinged, TimePoint now) {
   return true;
 }
 
-bool SharedTour::tell(const Company& company, TimePoint now) {
-  if (company == positions_told_) return false;
+bool SharedTour::tell(const Participants& participants, TimePoint now) {
+  if (participants == positions_told_) return false;
   if (positions_told_at_ && now - *positions_told_at_ < between_positions) return false;
-  positions_told_ = company;
+  positions_told_ = participants;
   positions_told_at_ = now;
-  tell_followers(company);
+  tell_followers(participants);
   return true;
 }
 

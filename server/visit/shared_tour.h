@@ -45,9 +45,9 @@ class SharedTour {
   [[nodiscard]] bool tells_positions() const { return since_ && settings_.tells_places; }
   /// Where all participants are now. Tells the followers, and returns true for all others, if that
   /// is new and they heard of it half a second ago or more.
-  bool tell(const Company& company, TimePoint now);
+  bool tell(const Participants& participants, TimePoint now);
   /// Where all participants were when they heard of it last.
-  [[nodiscard]] const Company& positions_told() const { return positions_told_; }
+  [[nodiscard]] const Participants& positions_told() const { return positions_told_; }
 
  private:
   void tell_followers(const ServerMessage& message) const;
@@ -61,7 +61,7 @@ class SharedTour {
   TimePoint next_camera_{};  // followers hear of the camera from then on
   bool camera_is_new_ = false;
   std::optional<RateLimit> pings_;
-  Company positions_told_;
+  Participants positions_told_;
   std::optional<TimePoint> positions_told_at_;
 };
 

@@ -74,7 +74,7 @@ void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
   if (const auto* path = std::get_if<PosePath>(&message)) {
     frames_.follow(*path);
   } else if (const auto* settings = std::get_if<Settings>(&message)) {
-    stream_.plan().wish(*settings, now);
+    stream_.plan().request(*settings, now);
   } else if (const auto* selected = std::get_if<SelectScene>(&message)) {
     if (within(selected_, policy_.select_gap, now))
       awaited_scene_ = selected->scene_id;
@@ -102,7 +102,7 @@ void Visit::ask_again(TimePoint now) {
     return fail(error->code, error->message);
   awaited_scene_.reset();
   life_.enter(VisitState::queued);
-  if (const auto* position = std::get_if<QueuePlace>(&answer)) return say(*position, now);
+  if (const auto* position = std::get_if<QueuePosition>(&answer)) return say(*position, now);
   if (const auto* awaited = std::get_if<SceneAwaited>(&answer))
     return await_scene(hello_.scene_id, *awaited, now);
   life_.enter(VisitState::opening);
@@ -140,7 +140,7 @@ void Visit::await_scene(const std::string& scene_id, const SceneAwaited& awaited
   awaited_scene_ = scene_id;
   if (within(told_of_scene_, speak_at_least_every, now)) return;
   told_of_scene_ = now;
-  say(QueuePlace{1, awaited.estimate, true}, now);
+  say(QueuePosition{1, awaited.estimate, true}, now);
 }
 
 void Visit::on_stream_opened(const StreamOpened& opened, TimePoint now) {

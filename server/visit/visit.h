@@ -37,7 +37,7 @@ class Visit {
   void ask_again(TimePoint now);
   /// The connection was lost without a farewell. The visit closes after the grace period.
   void on_lost(TimePoint now);
-  /// The client has reconnected, perhaps with other wishes. It gets a welcome, then an IDR.
+  /// The client has reconnected, perhaps with other requests. It gets a welcome, then an IDR.
   /// Requires resumable().
   void on_resumed(const Hello& hello, Admission admission, TimePoint now);
 

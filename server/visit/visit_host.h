@@ -23,11 +23,11 @@ struct Admission {
   std::shared_ptr<const SceneEntry> scene;
   EncoderChoice encoder;
   EncoderEffort effort{};    // of libx264
-  double pixel_share = 1.0;  // granted share of the wish for a moving camera
+  double pixel_share = 1.0;  // granted share of the request for a moving camera
 };
 
 /// The answer to a hello.
-using AdmissionAnswer = std::variant<Admission, QueuePlace, SceneAwaited, ErrorMessage>;
+using AdmissionAnswer = std::variant<Admission, QueuePosition, SceneAwaited, ErrorMessage>;
 
 /// Serves a visit with the server around it. The owner of the visit implements it; tests fake it.
 class VisitHost {

@@ -20,7 +20,7 @@ struct VisitPolicy {
   int max_fps = 120;
   int default_bitrate_kbps = 8000;
   int max_bitrate_kbps = 100'000;
-  int max_pixels = 3840 * 2160;                // larger wishes are scaled down
+  int max_pixels = 3840 * 2160;                // larger requests are scaled down
   float detail_px = 0.5f;                      // of trees: the finest, see DetailLadder
   std::chrono::milliseconds still_after{100};  // without another view, at least: see Rest
   int refine_frames = 60;  // that sharpen a still picture at most, where the link is slow

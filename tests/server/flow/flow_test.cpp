@@ -237,7 +237,7 @@ TEST(Flow, AStillForASlowDecoderIsFullSizeToo) {
 
 TEST(FlowControl, AcknowledgedFramesStandInNoQueue) {
   FlowControl flow;
-  flow.set_wish({{1280, 720}, 60, 8'000, false});
+  flow.set_request({{1280, 720}, 60, 8'000, false});
   TimePoint now = TimePoint{} + 1h;
   constexpr std::size_t bytes = 40'000;  // 40 ms at 8 Mbit/s
   for (std::uint64_t id = 1; id <= 60; ++id) {
@@ -257,7 +257,7 @@ TEST(FlowControl, AcknowledgedFramesStandInNoQueue) {
 
 TEST(FlowControl, AFrameThatWasGivenUpUnseenTellsNothingOfTheLink) {
   FlowControl flow;
-  flow.set_wish({{1280, 720}, 60, 20'000, false});
+  flow.set_request({{1280, 720}, 60, 20'000, false});
   TimePoint now = TimePoint{} + 1h;
   std::uint64_t id = 0;
   const auto pass = [&](std::chrono::milliseconds delay, bool given_up) {

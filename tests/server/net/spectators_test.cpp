@@ -86,7 +86,7 @@ TEST(Spectators, SeeWhatTheHostSeesInOneEncoding) {
   const v1::Welcome welcome = spectator.greet(watching_hello(host.welcome.watch_token()));
   EXPECT_TRUE(welcome.watching());
   EXPECT_EQ(welcome.session_id(), host.welcome.session_id());
-  EXPECT_EQ(welcome.config().width_px(), 160u) << "the host's picture, whatever was wished for";
+  EXPECT_EQ(welcome.config().width_px(), 160u) << "the host's picture, whatever was requested for";
   EXPECT_EQ(welcome.resume_token(), "") << "the host's secrets stay the host's";
   EXPECT_EQ(welcome.watch_token(), "");
 

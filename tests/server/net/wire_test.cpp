@@ -338,7 +338,7 @@ TEST(Wire, ReadsAndChecksPicks) {
 TEST(Wire, SaysWhichMessagesReplaceEachOther) {
   EXPECT_EQ(wire::serialize(Welcome{}).topic, Topic::session);
   EXPECT_EQ(wire::serialize(StreamConfig{}).topic, Topic::stream);
-  EXPECT_EQ(wire::serialize(QueuePlace{}).topic, Topic::place);
+  EXPECT_EQ(wire::serialize(QueuePosition{}).topic, Topic::place);
   EXPECT_EQ(wire::serialize(Stats{}).topic, Topic::statistics);
   EXPECT_EQ(wire::serialize(Heartbeat{}).topic, Topic::clock);
   EXPECT_EQ(wire::serialize(ErrorMessage{}).topic, Topic::event);

@@ -93,7 +93,7 @@ TEST(AdmissionBudget, NobodyIsReducedInVain) {
 TEST(AdmissionBudget, PixelsComeBackWhereThereIsRoom) {
   const AdmissionBudget budget({.cpus = 2}, 10);
   std::vector<SessionDemand> present{session(0.02), session(0.02), session(0.02)};
-  EXPECT_FALSE(budget.growth(present)) << "all have what they wish";
+  EXPECT_FALSE(budget.growth(present)) << "all have what they request";
   present[0].pixel_share = 0.25;
   present[1].pixel_share = 0.8;
   present[1].megapixels = 0.9;
@@ -103,7 +103,7 @@ TEST(AdmissionBudget, PixelsComeBackWhereThereIsRoom) {
   EXPECT_EQ(growth->pixel_share, 1.0);
   present[2].frame_cost->cpu_seconds = 0.15;
   EXPECT_FALSE(budget.growth(present)) << "the machine is nearly full";
-  EXPECT_TRUE(budget.growth(std::span(present).first(1))) << "alone it has what it wishes";
+  EXPECT_TRUE(budget.growth(std::span(present).first(1))) << "alone it has what it requests";
 }
 
 TEST(AdmissionBudget, ABurstWaitsForWhatTheFirstOnesCost) {

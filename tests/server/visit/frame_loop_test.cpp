@@ -10,7 +10,7 @@ namespace {
 class FrameLoopTest : public testing::Test {
  protected:
   FrameLoopTest() {
-    flow.set_wish({{640, 360}, 60, 8000});
+    flow.set_request({{640, 360}, 60, 8000});
     SceneFacts scene;
     scene.about.background_rgb = 0xff0000;
     loop.enter_scene(scene);
@@ -281,7 +281,7 @@ class RestTest : public FrameLoopTest {
   RestTest() {
     moving_px = {426, 240};
     still_px = {1280, 720};
-    flow.set_wish({moving_px, 60, 8000});
+    flow.set_request({moving_px, 60, 8000});
   }
 };
 

@@ -1,4 +1,4 @@
-// How pictures are to be encoded: wishes within the policy, and what the server has room for.
+// How pictures are to be encoded: requests within the policy, and what the server has room for.
 
 #include "server/visit/picture_plan.h"
 
@@ -25,15 +25,15 @@ class PicturePlanTest : public testing::Test {
 };
 
 TEST_F(PicturePlanTest, RequestsEndAtThePolicy) {
-  const auto wish = [&](glm::ivec2 size_px, int kbps) {
-    return wish_within(policy, {.size_px = size_px, .max_bitrate_kbps = kbps}, {640, 360});
+  const auto request = [&](glm::ivec2 size_px, int kbps) {
+    return request_within(policy, {.size_px = size_px, .max_bitrate_kbps = kbps}, {640, 360});
   };
-  EXPECT_EQ(wish({3840, 2160}, 0).size_px, glm::ivec2(3840, 2160));
-  EXPECT_EQ(wish({3842, 2160}, 0).size_px, glm::ivec2(3840, 2158));
+  EXPECT_EQ(request({3840, 2160}, 0).size_px, glm::ivec2(3840, 2160));
+  EXPECT_EQ(request({3842, 2160}, 0).size_px, glm::ivec2(3840, 2158));
   EXPECT_EQ(still_size_within(policy, {.still_size_px = {8192, 4608}}, {640, 360}),
             glm::ivec2(3840, 2160));
-  EXPECT_EQ(wish({}, 99'999).bitrate_kbps, 99'999);
-  EXPECT_EQ(wish({}, 100'001).bitrate_kbps, 100'000);
+  EXPECT_EQ(request({}, 99'999).bitrate_kbps, 99'999);
+  EXPECT_EQ(request({}, 100'001).bitrate_kbps, 100'000);
 }
 
 TEST_F(PicturePlanTest, AStillIsNoSmallerThanMotionAndWithinTheLimit) {
@@ -49,14 +49,14 @@ TEST_F(PicturePlanTest, AStillIsNoSmallerThanMotionAndWithinTheLimit) {
   EXPECT_EQ(still_size_within(policy, settings, {100, 100}), glm::ivec2(426, 240));
 }
 
-TEST_F(PicturePlanTest, IsThatOfTheHelloUntilTheClientWishesOtherwise) {
+TEST_F(PicturePlanTest, IsThatOfTheHelloUntilTheClientAsksForAnother) {
   EXPECT_EQ(plan.moving().size_px, glm::ivec2(640, 360)) << "made even";
   EXPECT_EQ(plan.moving().fps, policy.default_fps);
   EXPECT_EQ(plan.moving().bitrate_kbps, policy.default_bitrate_kbps);
   EXPECT_EQ(plan.still(), plan.moving());
   Settings settings = sized({320, 180});
   settings.max_fps = 30;
-  plan.wish(settings, now);
+  plan.request(settings, now);
   EXPECT_EQ(plan.moving().size_px, glm::ivec2(320, 180));
   EXPECT_EQ(plan.moving().fps, 30);
 }
@@ -69,7 +69,7 @@ TEST_F(PicturePlanTest, SettingsThatAlternateQuicklyAreFollowedFourTimesASecond)
   for (int ms = 1; ms <= 1000; ++ms) {
     now += 1ms;
     settings = sized({320 + 2 * (ms % 100), 180});
-    plan.wish(settings, now);
+    plan.request(settings, now);
     if (ms % 250 == 0) plan.on_tick(now);
     if (std::exchange(last, plan.moving()) != plan.moving()) ++encoders;
   }
@@ -77,23 +77,23 @@ TEST_F(PicturePlanTest, SettingsThatAlternateQuicklyAreFollowedFourTimesASecond)
   EXPECT_GE(encoders, 3);
   now += 250ms;
   plan.on_tick(now);
-  EXPECT_EQ(plan.moving().size_px, settings.size_px) << "the last wish is not forgotten";
+  EXPECT_EQ(plan.moving().size_px, settings.size_px) << "the last request is not forgotten";
 }
 
 TEST_F(PicturePlanTest, AShareOfThePixelsConcernsMotionAlone) {
-  plan.wish(sized({640, 360}, {1280, 720}), now);
+  plan.request(sized({640, 360}, {1280, 720}), now);
   plan.use_pixel_share(0.25);
   EXPECT_EQ(plan.moving().size_px, glm::ivec2(320, 180));
   EXPECT_EQ(plan.still_size_px(), glm::ivec2(1280, 720));
 }
 
 TEST_F(PicturePlanTest, StillsThatFailedAreAsInMotionUntilTheClientWishesAnew) {
-  plan.wish(sized({426, 240}, {1280, 720}), now);
+  plan.request(sized({426, 240}, {1280, 720}), now);
   EXPECT_EQ(plan.still().size_px, glm::ivec2(1280, 720));
   EXPECT_EQ(plan.still().fps, still_fps);
   plan.allow_larger_stills(false);
   EXPECT_EQ(plan.still(), plan.moving());
-  plan.wish(sized({426, 240}, {1920, 1080}), now += 250ms);
+  plan.request(sized({426, 240}, {1920, 1080}), now += 250ms);
   EXPECT_EQ(plan.still().size_px, glm::ivec2(1920, 1080));
 }
 
@@ -102,7 +102,7 @@ TEST_F(PicturePlanTest, StillsOfTheirOwnSizeAreMadeWithGoodEffort) {
   EXPECT_EQ(plan.moving().x264_preset, "ultrafast");
   EXPECT_EQ(plan.moving().threads, 4);
   EXPECT_EQ(plan.still(), plan.moving()) << "in the stream of motion";
-  plan.wish(sized({426, 240}, {1280, 720}), now);
+  plan.request(sized({426, 240}, {1280, 720}), now);
   EXPECT_EQ(plan.still().x264_preset, "superfast") << "less effort would cost more bytes";
   EXPECT_EQ(plan.still().threads, 4);
 }

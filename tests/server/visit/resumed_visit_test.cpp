@@ -21,12 +21,12 @@ class SessionLife : public test::VisitTest {
 };
 
 TEST_F(SessionLife, WaitsForAPlaceAndSpeaksMeanwhile) {
-  const AdmissionAnswer granted = std::exchange(host.admission, QueuePlace{3, 40s});
+  const AdmissionAnswer granted = std::exchange(host.admission, QueuePosition{3, 40s});
   Hello hello = resuming();
   session.on_message(hello, now);
   EXPECT_EQ(session.life().state(), VisitState::queued);
-  ASSERT_EQ(host.count<QueuePlace>(), 1);
-  EXPECT_EQ(std::get<QueuePlace>(host.said.back()).position, 3);
+  ASSERT_EQ(host.count<QueuePosition>(), 1);
+  EXPECT_EQ(std::get<QueuePosition>(host.said.back()).position, 3);
 
   now += policy.hello_timeout + policy.idle_timeout;
   session.on_tick(now);
@@ -35,14 +35,14 @@ TEST_F(SessionLife, WaitsForAPlaceAndSpeaksMeanwhile) {
   Settings smaller;
   smaller.size_px = {320, 180};
   session.on_message(smaller, now);
-  session.say(QueuePlace{1, 10s}, now);
-  EXPECT_EQ(std::get<QueuePlace>(host.said.back()).position, 1);
+  session.say(QueuePosition{1, 10s}, now);
+  EXPECT_EQ(std::get<QueuePosition>(host.said.back()).position, 1);
 
   host.admission = granted;
   session.ask_again(now);
   EXPECT_EQ(session.life().state(), VisitState::opening);
   ASSERT_EQ(host.opened.size(), 1u);
-  EXPECT_EQ(host.opened[0].encoding.size_px, glm::ivec2(320, 180)) << "wishes of those who wait";
+  EXPECT_EQ(host.opened[0].encoding.size_px, glm::ivec2(320, 180)) << "requests of those who wait";
   open_stream();
   EXPECT_EQ(host.count<Welcome>(), 1);
   session.on_tick(now);

@@ -240,7 +240,7 @@ class SessionsTest : public testing::Test {
   /// A new visitor, who was welcomed, refused or waits.
   Visitor& join(
       const std::string& resume_token = {}, const std::string& from = "192.0.2.1",
-      const std::function<void(v1::Hello&)>& wish = [](v1::Hello&) {}) {
+      const std::function<void(v1::Hello&)>& request = [](v1::Hello&) {}) {
     auto connection = std::make_shared<OpenConnection>(from);
     Visitor& visitor = clients.emplace_back(Visitor{connection, sessions->accept(connection)});
     v1::ClientMessage message;
@@ -250,7 +250,7 @@ class SessionsTest : public testing::Test {
     hello.set_viewport_height_px(96);
     hello.add_decoders(v1::CODEC_H264);
     if (!resume_token.empty()) hello.mutable_resume()->set_token(resume_token);
-    wish(hello);
+    request(hello);
     say(visitor, message);
     run_until([&] { return connection->welcome || connection->waits || connection->closed; });
     return visitor;

@@ -328,11 +328,11 @@ TEST_F(SharedTourTest, AFollowerWithoutAccessToTheLeadersSceneOnlyWatchesIt) {
     }};
   };
   begin(false, false);
-  const auto join_by_narrow_link = [&](const std::string& resume_token, const auto& wish) {
+  const auto join_by_narrow_link = [&](const std::string& resume_token, const auto& request) {
     return join(resume_token, "192.0.2.1",
                 [&](v1::Hello& hello) {
                   hello.set_token("narrow");
-                  wish(hello);
+                  request(hello);
                 })
         .connection;
   };

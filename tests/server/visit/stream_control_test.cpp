@@ -34,8 +34,8 @@ class StreamControlTest : public testing::Test {
     stream.end_frame();
     return stream.mend(failed);
   }
-  void wish(glm::ivec2 size_px, glm::ivec2 still_size_px = {0, 0}) {
-    stream.plan().wish({.size_px = size_px, .still_size_px = still_size_px}, now += 250ms);
+  void request(glm::ivec2 size_px, glm::ivec2 still_size_px = {0, 0}) {
+    stream.plan().request({.size_px = size_px, .still_size_px = still_size_px}, now += 250ms);
   }
 
   TimePoint now = TimePoint{} + 1h;
@@ -120,7 +120,7 @@ TEST_F(StreamControlTest, ANewWishOpensAnEncoderWithAnIdrAndIsTold) {
   begin();
   FrameOrder order = stream.begin_frame(false, now);
   EXPECT_TRUE(order.force_idr);
-  wish({320, 180});
+  request({320, 180});
   EXPECT_FALSE(make(order)) << "that frame was of the old size";
   EXPECT_EQ(stream.config().size_px, glm::ivec2(640, 360));
   order = stream.begin_frame(false, now);
@@ -150,7 +150,7 @@ TEST_F(StreamControlTest, AnotherEffortOpensTheEncoderAnewWithoutAWord) {
 
 TEST_F(StreamControlTest, RefinementsStayInTheStreamOfTheirStill) {
   begin();
-  wish({426, 240}, {1280, 720});
+  request({426, 240}, {1280, 720});
   stream.plan().use_effort({.preset = 0, .threads = 2});
   make(stream.begin_frame(false, now));
   EXPECT_FALSE(stream.shows_still_size());
@@ -185,7 +185,7 @@ TEST_F(StreamControlTest, GoesOnWithAnotherEncoderWhereTheDriverOpensNoMore) {
 
 TEST_F(StreamControlTest, AStillThatCannotBeSoLargeHasTheSizeOfMotion) {
   begin();
-  wish({426, 240}, {1280, 720});
+  request({426, 240}, {1280, 720});
   EXPECT_TRUE(mends(Fault::encoder_unavailable, true));
   const FrameOrder order = stream.begin_frame(true, now + 300ms);
   EXPECT_EQ(order.encoding.size_px, glm::ivec2(426, 240));
@@ -197,7 +197,7 @@ TEST_F(StreamControlTest, AStillThatCannotBeSoLargeHasTheSizeOfMotion) {
 
 TEST_F(StreamControlTest, AnEncoderThatFailsAtALargerOneMakesWayAsInMotion) {
   begin(EncoderKind::nvenc);
-  wish({426, 240}, {1280, 720});
+  request({426, 240}, {1280, 720});
   host.other = EncoderChoice{EncoderKind::x264, Codec::h264, "libx264"};
   EXPECT_TRUE(mends(Fault::encoder_failed, true));
   ASSERT_EQ(host.opened.size(), 2u);
@@ -209,7 +209,7 @@ TEST_F(StreamControlTest, AnEncoderThatFailsAtALargerOneMakesWayAsInMotion) {
 
 TEST_F(StreamControlTest, ALostDeviceIsNoMatterOfSizesAndEncoders) {
   begin();
-  wish({426, 240}, {1280, 720});
+  request({426, 240}, {1280, 720});
   host.other = EncoderChoice{EncoderKind::jpeg, Codec::mjpeg, "mjpeg"};
   EXPECT_FALSE(mends(Fault::device_failed, true));
   EXPECT_FALSE(mends(Fault::other));

@@ -51,18 +51,18 @@ TEST_F(VisitTest, AHelloWaitsForItsSceneAndIsTold) {
   const AdmissionAnswer admission = std::exchange(host.admission, SceneAwaited{5s});
   say_hello();
   EXPECT_TRUE(host.opened.empty());
-  ASSERT_EQ(host.count<QueuePlace>(), 1);
-  EXPECT_TRUE(std::get<QueuePlace>(host.said.back()).for_scene);
-  EXPECT_EQ(std::get<QueuePlace>(host.said.back()).estimate, 5s);
+  ASSERT_EQ(host.count<QueuePosition>(), 1);
+  EXPECT_TRUE(std::get<QueuePosition>(host.said.back()).for_scene);
+  EXPECT_EQ(std::get<QueuePosition>(host.said.back()).estimate, 5s);
   for (int tick = 0; tick < 8; ++tick) session.on_tick(now += 250ms);
-  EXPECT_EQ(host.count<QueuePlace>(), 3) << "about once a second";
+  EXPECT_EQ(host.count<QueuePosition>(), 3) << "about once a second";
   host.admission = admission;
   session.on_tick(now += 250ms);
   ASSERT_EQ(host.opened.size(), 1u);
   open_stream();
   EXPECT_EQ(host.count<Welcome>(), 1);
   for (int tick = 0; tick < 8; ++tick) session.on_tick(now += 250ms);
-  EXPECT_EQ(host.count<QueuePlace>(), 3);
+  EXPECT_EQ(host.count<QueuePosition>(), 3);
   EXPECT_EQ(host.opened.size(), 1u);
 }
 
@@ -82,7 +82,7 @@ TEST_F(VisitTest, TheOldSceneIsShownWhileTheNextOneIsLoaded) {
   ack(1);
   host.scene_awaited = true;
   session.on_message(SelectScene{"b"}, now);
-  EXPECT_TRUE(std::get<QueuePlace>(host.said.back()).for_scene);
+  EXPECT_TRUE(std::get<QueuePosition>(host.said.back()).for_scene);
   pose(2, 1.0f);
   now += 1s;
   EXPECT_TRUE(frame_is_due());

@@ -1,4 +1,4 @@
-// Messages of companies, portals and clip planes.
+// Messages of shared tours, portals and clip planes.
 
 #include "tests/server/net/wire_messages.h"
 #include "tests/support/test.h"
@@ -6,7 +6,7 @@
 namespace catgs {
 namespace {
 
-TEST(WireCompany, BoundsThePlaceOfAPingAndTheNameOfAScene) {
+TEST(WireSharedTour, BoundsThePlaceOfAPingAndTheNameOfAScene) {
   v1::ClientMessage message;
   message.mutable_ping()->mutable_place()->set_z(-4.0f);
   EXPECT_EQ(parsed<Ping>(message).place.z, -4.0f);
@@ -35,15 +35,15 @@ TEST(WireClip, IsAPlaneOfFiniteNumbers) {
   EXPECT_EQ(wrong_field(message), "clip.offset");
 }
 
-TEST(WireCompany, TellsWhereACompanyIs) {
+TEST(WireSharedTour, ListsThePositionsOfParticipants) {
   EXPECT_EQ(wire::serialize(Pinged{}).topic, Topic::ping);
-  EXPECT_EQ(wire::serialize(Company{}).topic, Topic::company);
+  EXPECT_EQ(wire::serialize(Participants{}).topic, Topic::participants);
   EXPECT_EQ(hex(wire::serialize(Pinged{{1.0f, 0.0f, 0.0f}, true}).bytes),
             "01"
             "5209"
             "0a050d0000803f"
             "1001");
-  EXPECT_EQ(hex(wire::serialize(Company{{{1.0f, 0.0f, 0.0f}, {}}}).bytes),
+  EXPECT_EQ(hex(wire::serialize(Participants{{{1.0f, 0.0f, 0.0f}, {}}}).bytes),
             "01"
             "5a09"
             "0a050d0000803f"
