@@ -19,6 +19,7 @@ export class Toolbar {
   private readonly bar_ = by_id('toolbar', HTMLElement);
   /** Whether another visitor moves the camera: then there is less to control. */
   watching = false;
+  private work_: { readonly panel: Panel; readonly is_unsaved: () => boolean } | undefined;
   private readonly small_screen_ = matchMedia(small_screen);
 
   constructor(private readonly navigation_: Navigation) {
@@ -41,8 +42,16 @@ export class Toolbar {
 
   /** Turns the toolbar off while there is nothing to control. A card then says why. */
   set_active(active: boolean): void {
-    this.bar_.inert = !active;
-    if (!active) this.close_all();
+    const kept = !active && this.work_?.is_unsaved() ? this.work_.panel : undefined;
+    this.bar_.inert = !active && !kept;
+    if (active) return;
+    for (const panel of panels) if (panel !== kept) this.close(panel);
+    if (kept) this.open(kept);
+  }
+
+  /** While this panel holds unsaved work, it stays usable, whatever becomes of the session. */
+  keep_usable(panel: Panel, is_unsaved: () => boolean): void {
+    this.work_ = { panel, is_unsaved };
   }
 
   open(panel: Panel): void {
