@@ -1,6 +1,6 @@
 import { Signal } from '../base/signal';
 import type { CameraMode } from '../camera/mode';
-import { is_for_page } from '../input/view_input';
+import { is_for_page, letter_of } from '../input/key';
 import { text } from '../text/text';
 import { by_id, hint_at_more, on_click } from './dom';
 import type { Navigation } from './navigation';
@@ -69,19 +69,21 @@ export class Toolbar {
 
   private bind_keys(): void {
     const actions: Readonly<Record<string, () => void>> = {
-      KeyM: () => this.navigation_.next_mode(),
-      KeyR: () => this.navigation_.reset(),
-      KeyU: () => this.navigation_.turn_up(Math.PI),
-      KeyF: toggle_full_screen,
-      KeyI: () => this.toggle('stats'),
-      KeyH: () => this.toggle('help'),
+      M: () => this.navigation_.next_mode(),
+      R: () => this.navigation_.reset(),
+      U: () => this.navigation_.turn_up(Math.PI),
+      F: toggle_full_screen,
+      I: () => this.toggle('stats'),
+      H: () => this.toggle('help'),
       Escape: () => this.close_all(),
     };
     const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, _: -2 };
     window.addEventListener('keydown', (event) => {
-      if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
-      if (this.watching && !(event.code in { KeyF: 1, KeyI: 1, Escape: 1 })) return;
-      actions[event.code]?.();
+      // A key that moves the camera has been taken: on some layouts it bears one of these letters.
+      if (this.bar_.inert || event.repeat || event.defaultPrevented || !is_for_page(event)) return;
+      const letter = letter_of(event);
+      if (this.watching && !['F', 'I', 'Escape'].includes(letter)) return;
+      actions[letter]?.();
       // By its sign, because its position differs from layout to layout.
       const steps = faster[event.key];
       if (steps) this.navigation_.faster(steps);
