@@ -1,4 +1,4 @@
-import { defineConfig, loadEnv } from 'vite';
+import { defineConfig, loadEnv, transformWithEsbuild, type Plugin } from 'vite';
 import { with_texts } from './page_texts';
 
 /** The part of http.IncomingMessage (Node.js) that this file uses. */
@@ -7,13 +7,33 @@ interface Request {
   readonly headers: { readonly upgrade?: string | undefined };
 }
 
+// The bundler cannot leave out the enumerations that TypeScript makes: a call fills each.
+const unused_enums = (code: string): string =>
+  code.replace(
+    /export var (\w+);\s*\(function \(\1\) \{([^}]*)\}\)\(\1 \|\| \(\1 = \{\}\)\);/g,
+    'export const $1 = /*@__PURE__*/ (function ($1) {$2 return $1; })({});',
+  );
+
+/** Makes files smaller than minifying does. */
+const smaller: Plugin = {
+  name: 'smaller',
+  transform: (code, file) =>
+    file.includes('@bufbuild/protobuf') ? { code: unused_enums(code), map: null } : null,
+  // Names of private members end so, and no others do.
+  renderChunk: (code, { fileName }) =>
+    transformWithEsbuild(code, fileName, { mangleProps: /[^_]_$/, loader: 'js' }),
+};
+
 export default defineConfig(({ mode }) => {
   const target = loadEnv(mode, '.', 'CATGS_')['CATGS_SERVER_URL'] ?? 'http://127.0.0.1:8080';
   return {
     // Nothing is inlined, because the server's Content-Security-Policy allows its own files only.
     // Paths are relative, so that the page works below any prefix of a reverse proxy.
     base: './',
-    plugins: [{ name: 'page-texts', transformIndexHtml: { order: 'pre', handler: with_texts } }],
+    plugins: [
+      { name: 'page-texts', transformIndexHtml: { order: 'pre', handler: with_texts } },
+      smaller,
+    ],
     build: {
       target: 'es2022',
       assetsInlineLimit: 0,
@@ -21,7 +41,7 @@ export default defineConfig(({ mode }) => {
       emptyOutDir: true,
       reportCompressedSize: false,
     },
-    worker: { format: 'es' },
+    worker: { format: 'es', plugins: () => [smaller] },
     // `npm run dev` serves the page from here and all else from a catgs-server.
     server: {
       proxy: {

@@ -93,19 +93,6 @@ describe('page', () => {
     await stays.waitFor();
   });
 
-  it('says that it is broken when it is', async () => {
-    const server = await start_fake_server(stream);
-    const { page } = await new_page();
-    await page.goto(server.url);
-    await page.evaluate(() => {
-      // An error thrown from here would come muted ("Script error."), like one from another site.
-      window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' }));
-    });
-    await page.getByText('This page ran into an error').waitFor();
-    await page.getByText('a planted fault').waitFor();
-    await page.getByRole('button', { name: 'Reload' }).waitFor();
-  });
-
   it('asks for a token when its own is refused, and uses the one that is entered', async () => {
     const server = await start_fake_server((peer, body) => {
       const is_wrong = body.case === 'hello' && body.value.token !== 'right';

@@ -5,7 +5,7 @@ import { available_codecs, make_decoder } from '#client/decode/make_decoder';
 import type { DecoderRung } from '#client/decode/ladder';
 import type { DecoderEvents } from '#client/decode/picture';
 import { Codec, StreamConfigSchema } from '#client/wire/wire';
-import { fake_storage } from './fakes';
+import { FakeTime, fake_storage } from './fakes';
 
 const week_ms = 7 * 24 * 3600 * 1000;
 
@@ -19,7 +19,7 @@ describe('what is remembered of decoders', () => {
     expect(remembered_rung(storage, 'Browser/2', 0)).toBe('prefer-hardware');
   });
 
-  it('is nothing where it makes no sense, or storage is blocked', () => {
+  it('is nothing where it makes no sense', () => {
     const warned = vi.spyOn(console, 'warn').mockImplementation(() => undefined);
     const storage = fake_storage();
     storage.setItem('catgs.decoder', '{ broken');
@@ -27,8 +27,6 @@ describe('what is remembered of decoders', () => {
     expect(warned).toHaveBeenCalled();
     storage.setItem('catgs.decoder', '{"rung":"magic","agent":"a","until_ms":9}');
     expect(remembered_rung(storage, 'a', 0)).toBe('prefer-hardware');
-    expect(remembered_rung(undefined, 'a', 0)).toBe('prefer-hardware');
-    remember_rung('jpeg', undefined, 'a', 0);
   });
 });
 
@@ -58,7 +56,7 @@ describe('the ladder', () => {
 
   const video = create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.42C01F' });
   const rung_after = async (first: DecoderRung, failures: number): Promise<string | undefined> =>
-    (await make_decoder(video, first, failures, () => 0, events))?.rung;
+    (await make_decoder(video, first, failures, () => 0, new FakeTime(), events))?.rung;
 
   it('goes down a rung after two real failures, and begins where it ended', async () => {
     expect(await rung_after('prefer-hardware', 1)).toBe('prefer-hardware');
@@ -73,6 +71,21 @@ describe('the ladder', () => {
     supported = ['no-preference', 'prefer-software'];
     expect(await rung_after('prefer-hardware', 0)).toBe('no-preference');
     expect(await rung_after('prefer-hardware', 2)).toBe('prefer-software');
+  });
+
+  it('leaves out what the browser cannot be asked for, or never answers', async () => {
+    vi.spyOn(console, 'warn').mockImplementation(() => undefined);
+    const time = new FakeTime();
+    vi.stubGlobal('VideoDecoder', {
+      isConfigSupported: ({ hardwareAcceleration }: VideoDecoderConfig) =>
+        hardwareAcceleration === 'prefer-hardware'
+          ? new Promise(() => undefined)
+          : Promise.reject(new TypeError('invalid')),
+    });
+    const made = make_decoder(video, 'prefer-hardware', 0, () => 0, time, events);
+    for (let i = 0; i < 3; ++i) time.advance(1000);
+    expect(await made).toBeUndefined();
+    vi.restoreAllMocks();
   });
 
   it('asks for JPEG alone at its end, and without WebCodecs', () => {

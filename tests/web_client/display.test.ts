@@ -20,6 +20,7 @@ let now_us = 0;
 const presenter = (can_warp: boolean): Presenter => ({
   kind: 'webgl2',
   can_warp,
+  most_px: Infinity,
   draw: (_picture, placing) => {
     drawn.push(placing);
     return Promise.resolve();

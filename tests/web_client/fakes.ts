@@ -36,6 +36,12 @@ export class FakeTime implements Clock, Timers {
     };
   }
 
+  /** Timers that were due meanwhile fire once, afterwards. */
+  sleep(ms: number): void {
+    this.now_ms_ += ms;
+    this.advance(0);
+  }
+
   advance(ms: number): void {
     const end_ms = this.now_ms_ + ms;
     for (;;) {

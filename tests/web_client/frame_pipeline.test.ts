@@ -1,9 +1,10 @@
 import { create, type MessageInitShape } from '@bufbuild/protobuf';
-import { beforeEach, describe, expect, it } from 'vitest';
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { FramePipeline } from '#client/decode/frame_pipeline';
 import { Latest } from '#client/decode/latest';
 import type { Decoder, DecoderEvents, EncodedFrame, Picture } from '#client/decode/picture';
 import { Codec, FrameHeaderSchema, StreamConfigSchema, type AckInit } from '#client/wire/wire';
+import { FakeTime } from './fakes';
 
 interface FakePicture {
   id: bigint;
@@ -34,10 +35,13 @@ class FakeDecoder implements Decoder {
 }
 
 let now_us: number;
+let time: FakeTime;
 let decoders: FakeDecoder[];
 let failures_seen: number[];
 let has_decoder: boolean;
 let goes_on: boolean; // decoders take another stream
+let make: (made: Decoder | undefined) => Promise<Decoder | undefined>;
+let draw: () => Promise<void>;
 let fails_at: bigint | undefined; // the frame on which decoders fail at once
 let refresh: (() => void)[];
 let drawn: FakePicture[];
@@ -50,6 +54,10 @@ let pipeline: FramePipeline;
 
 beforeEach(() => {
   now_us = 1000;
+  time = new FakeTime();
+  vi.spyOn(console, 'warn').mockImplementation(() => undefined);
+  make = (made) => Promise.resolve(made);
+  draw = () => Promise.resolve();
   decoders = [];
   failures_seen = [];
   has_decoder = true;
@@ -65,17 +73,18 @@ beforeEach(() => {
   pipeline = new FramePipeline(
     {
       now_us: () => now_us,
+      timers: time,
       make_decoder: (_config, failures, events) => {
         failures_seen.push(failures);
-        if (!has_decoder) return Promise.resolve(undefined);
+        if (!has_decoder) return make(undefined);
         const decoder = new FakeDecoder(events);
         decoders.push(decoder);
-        return Promise.resolve(decoder);
+        return make(decoder);
       },
       on_refresh: (draw) => refresh.push(draw),
       draw: (picture) => {
         drawn.push(picture as unknown as FakePicture);
-        return Promise.resolve();
+        return draw();
       },
     },
     {
@@ -87,6 +96,8 @@ beforeEach(() => {
     },
   );
 });
+
+afterEach(() => void vi.restoreAllMocks());
 
 const settle = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
 
@@ -154,7 +165,7 @@ describe('newest frame wins', () => {
     const made = await configure();
     push(1n);
     const picture = decode(made, 1n);
-    pipeline.discard_pending();
+    pipeline.hidden = true;
     await display();
     expect(picture.closed).toBe(true);
     expect(drawn).toEqual([]);
@@ -297,6 +308,113 @@ describe('failures', () => {
     await settle();
     await configure();
     expect(failures_seen).toEqual([0, 1, 0]);
+  });
+});
+
+describe('a step that does not end', () => {
+  const never = (): Promise<never> => new Promise(() => undefined);
+  const seconds = async (count: number): Promise<void> => {
+    for (let i = 0; i < count; ++i) {
+      time.advance(1000);
+      await settle();
+    }
+  };
+
+  it('of a decoder that gives neither picture nor error is a failure', async () => {
+    const first = await configure();
+    push(1n);
+    await seconds(2);
+    decode(first, 1n);
+    push(2n);
+    await seconds(2);
+    expect(decoders).toEqual([first]); // each picture is a sign of life
+    await seconds(1);
+    expect(first.closed).toBe(true);
+    expect(decoders).toHaveLength(2);
+    expect([failures_seen, key_frames_wanted, dropped]).toEqual([[0, 1], 1, [2n]]);
+    await seconds(20); // nothing is inside: nothing is late
+    expect(decoders).toHaveLength(2);
+  });
+
+  it('is none that a machine slept through', async () => {
+    const first = await configure();
+    push(1n);
+    time.sleep(3_600_000);
+    await seconds(1);
+    expect(decoders).toEqual([first]);
+  });
+
+  it('of a decoder that is never made is a failure, and a late one is closed', async () => {
+    let late = (): void => undefined;
+    make = (made) => new Promise((resolve) => (late = () => resolve(made)));
+    await configure();
+    make = (made) => Promise.resolve(made);
+    await seconds(3);
+    expect(failures_seen).toEqual([0, 1]);
+    late();
+    await settle();
+    expect(decoders.map(({ closed }) => closed)).toEqual([true, false]);
+  });
+
+  it('of a decoder that cannot be made is a failure', async () => {
+    make = () => Promise.reject(new Error('not supported'));
+    pipeline.configure(create(StreamConfigSchema, { codec: Codec.H264, codecString: 'avc1.64' }));
+    make = (made) => Promise.resolve(made);
+    await settle();
+    expect(failures_seen).toEqual([0, 1]);
+  });
+
+  it.each([
+    ['never ends', never],
+    ['fails', () => Promise.reject(new Error('lost'))],
+  ])('of drawing, which %s, frees the canvas and is a failure', async (_name, drawing) => {
+    draw = drawing;
+    const first = await configure();
+    push(1n);
+    const picture = decode(first, 1n);
+    await display();
+    await seconds(3);
+    expect(picture.closed).toBe(true);
+    expect([failures_seen, dropped]).toEqual([[0, 1], [1n]]);
+    draw = () => Promise.resolve();
+    push(2n, { idr: true });
+    decode(decoder(), 2n);
+    await display();
+    expect(acks.at(-1)).toMatchObject({ frameId: 2n, dropped: false });
+  });
+});
+
+describe('a decoder that the browser takes back', () => {
+  const taken_back = new DOMException('reclaimed', 'QuotaExceededError');
+
+  it('costs no rung once it has worked, and one that never did counts', async () => {
+    const first = await configure();
+    push(1n);
+    decode(first, 1n);
+    first.events.failed(taken_back);
+    await settle();
+    decoder().events.failed(taken_back);
+    await settle();
+    expect(failures_seen).toEqual([0, 0, 1]);
+  });
+
+  it('from a hidden page is made again when somebody looks, and no failure', async () => {
+    const first = await configure();
+    push(1n);
+    pipeline.hidden = true;
+    time.advance(60_000); // a hidden page decodes when it may
+    first.events.failed(new DOMException('closed', 'OperationError'));
+    push(2n, { idr: true });
+    await configure(); // a reconnect
+    expect([decoders, key_frames_wanted]).toEqual([[first], 0]);
+    expect([...dropped].sort()).toEqual([1n, 2n]);
+    pipeline.hidden = false;
+    await settle();
+    expect([failures_seen, key_frames_wanted]).toEqual([[0, 0], 1]);
+    push(3n, { idr: true });
+    decode(decoder(), 3n);
+    await display();
+    expect(drawn.map(({ id }) => id)).toEqual([3n]);
   });
 });
 

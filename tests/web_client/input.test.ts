@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { no_axes } from '#client/camera/movement';
+import { letter_of, position_of } from '#client/input/key';
 import { HeldKeys } from '#client/input/keyboard';
 import { Pointers, wheel_steps, type PointerSample } from '#client/input/pointers';
 
@@ -19,6 +20,7 @@ const sample = (change: Partial<PointerSample>): PointerSample => ({
   y: 100,
   buttons: 1,
   shift: false,
+  primary: false,
   ...change,
 });
 
@@ -49,6 +51,24 @@ describe('keys', () => {
     for (let step = 0; step < 20; ++step) expect(keys.axes().forward).toBe(1);
     keys.up('KeyW', false);
     expect(keys.axes()).toEqual(no_axes);
+  });
+
+  it.each([
+    // The layout, what the event says, the letter of the help, the position.
+    ['English', { code: 'KeyM', key: 'm' }, 'M', 'KeyM'],
+    ['capitals', { code: 'KeyM', key: 'M' }, 'M', 'KeyM'],
+    ['French', { code: 'Semicolon', key: 'm' }, 'M', 'Semicolon'],
+    ['French, another key', { code: 'KeyM', key: ',' }, ',', 'KeyM'],
+    ['French, forward', { code: 'KeyW', key: 'z' }, 'Z', 'KeyW'],
+    ['Dvorak', { code: 'KeyO', key: 'r' }, 'R', 'KeyO'],
+    ['Russian', { code: 'KeyM', key: 'ь' }, 'M', 'KeyM'],
+    ['Japanese input', { code: 'KeyM', key: 'Process' }, 'M', 'KeyM'],
+    ['a tool without positions', { code: '', key: 'w' }, 'W', 'KeyW'],
+    ['a remote control', { code: 'Unidentified', key: 'PageDown' }, 'PageDown', 'PageDown'],
+    ['a remote control, space', { code: '', key: ' ' }, ' ', 'Space'],
+    ['Escape', { code: 'Escape', key: 'Escape' }, 'Escape', 'Escape'],
+  ])('have a letter and a position: %s', (_layout, event, letter, position) => {
+    expect([letter_of(event), position_of(event)]).toEqual([letter, position]);
   });
 
   it('are released when the page loses the keyboard', () => {
@@ -91,6 +111,7 @@ describe('mouse', () => {
     expect(wheel_steps(3, 1, false)).toBe(-0.99);
     expect(wheel_steps(-1e6, 2, false)).toBe(8);
     expect(wheel_steps(-5, 0, true)).toBe(0.4);
+    expect(wheel_steps(-100, 0, true)).toBe(1); // a wheel while Ctrl is held
   });
 });
 
@@ -120,6 +141,19 @@ describe('touch', () => {
     const moves = pointers.move(finger(2, 213, 100), height_px);
     const dolly = moves.find((gesture) => gesture.kind === 'dolly');
     expect(dolly?.steps).toBeCloseTo(1, 9);
+  });
+
+  it('forgets fingers whose end was lost when a first one comes, and all at once', () => {
+    const pointers = held(finger(1, 100, 100), finger(2, 200, 100));
+    pointers.down({ ...finger(3, 300, 100), primary: true });
+    expect(pointers.move(finger(3, 340, 100), height_px)).toEqual([
+      { kind: 'look', dx: 0.1, dy: 0 },
+    ]);
+    expect([pointers.release_all(), pointers.release_all(), pointers.count]).toEqual([
+      true,
+      false,
+      0,
+    ]);
   });
 
   it('ignores a third finger, and keeps looking when one of two is lifted', () => {

@@ -12,10 +12,8 @@ import {
 import type { Eye } from '#client/camera/eye';
 import { glide, glide_time_s } from '#client/camera/flight';
 import { Inertia } from '#client/camera/inertia';
-import { no_axes, sum_of } from '#client/camera/movement';
 import { project, ray_through, surface_of } from '#client/camera/ray';
 import type { SceneSetup } from '#client/camera/scene_setup';
-import { gamepad_axes } from '#client/input/gamepad';
 import { Taps } from '#client/input/pointers';
 import { camera, expect_vec, hold, scene, view_of } from './cameras';
 
@@ -248,34 +246,5 @@ describe('inertia', () => {
     flick(inertia);
     inertia.moved({ kind: 'look', dx: 0, dy: 0 }, 200);
     expect(inertia.step(0.1)).toBeUndefined();
-  });
-});
-
-describe('a gamepad', () => {
-  const pad = (axes: number[], pressed: Record<number, number> = {}) => ({
-    axes,
-    connected: true,
-    buttons: Array.from({ length: 16 }, (_, i) => ({
-      value: pressed[i] ?? 0,
-      pressed: (pressed[i] ?? 0) > 0.5,
-      touched: false,
-    })),
-  });
-
-  it('does nothing while its sticks are about at rest', () => {
-    const axes = gamepad_axes(pad([0.1, -0.1, 0.14, 0]));
-    expect(sum_of(axes, no_axes)).toEqual({ ...no_axes });
-  });
-
-  it('moves by the left stick and triggers, looks by the right stick', () => {
-    expect(gamepad_axes(pad([1, -1, 1, -1], { 7: 1, 5: 1 }))).toEqual({
-      right: 1,
-      forward: 1,
-      turn_right: 1,
-      turn_up: 1,
-      up: 1,
-      fast: true,
-    });
-    expect(gamepad_axes(pad([0, 0.5, 0, 0])).forward).toBeLessThan(-0.1);
   });
 });

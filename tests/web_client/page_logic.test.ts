@@ -69,13 +69,6 @@ describe('access token', () => {
     for (const href of ['http://host/?token=x', 'http://host/#stop=1', 'http://host/'])
       expect(has_token(href)).toBe(false);
   });
-
-  it('works without storage', () => {
-    const history = { state: null, replaceState: () => undefined };
-    const token_of = (href: string): string => new AccessToken({ href }, history, undefined).value;
-    expect(token_of('http://host/')).toBe('');
-    expect(token_of('http://host/#token=x')).toBe('x');
-  });
 });
 
 describe('device', () => {

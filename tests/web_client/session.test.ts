@@ -105,6 +105,40 @@ describe('greeting', () => {
   });
 });
 
+describe('a visitor who leaves', () => {
+  const cases = (i: number): unknown[] => socket(i).heard.map((body) => body.case);
+
+  it('says so wherever the session stands, and no connection is left', () => {
+    session.start();
+    socket(0).events.opened(); // in the queue
+    session.stop();
+    session.retry();
+    welcome(socket(1));
+    socket(1).say({ case: 'drain', value: {} });
+    welcome(socket(2), 'of the next server');
+    session.stop();
+    for (const i of [0, 1, 2]) expect(cases(i)).toContain('bye');
+    expect(sockets.map(({ closed }) => closed)).toEqual([true, true, true]);
+    time.advance(60_000);
+    expect(sockets).toHaveLength(3);
+  });
+
+  it('continues where they were when the page comes back', () => {
+    go_live();
+    session.send_pose(pose(7n));
+    session.keep({ case: 'clip', value: { offset: 2 } });
+    session.stop();
+    session.retry();
+    welcome(socket(1));
+    expect(socket(1).sent('hello')[0]).toMatchObject({
+      sceneId: 'city',
+      resume: { token: 'again', pose: { poseId: 7n } },
+    });
+    expect(socket(1).sent('clip')).toMatchObject([{ offset: 2 }]);
+    expect(last_state()).toEqual({ phase: 'live' });
+  });
+});
+
 describe('reconnecting', () => {
   it('follows a closed connection, with the same pose and the resume token', () => {
     const first = go_live();

@@ -12,7 +12,7 @@ import { SharedTour } from './ui/shared_tour';
 import { StreamSize } from './ui/stream_size';
 import { WalkableArea } from './walkable_area/mount';
 
-/** Returns what shows a fatal error of the page. `scene_id`: empty for the server's first scene. */
+/** Returns what tells of an error of the page. `scene_id`: empty for the server's first scene. */
 export function mount_viewer(
   card: CardView,
   token: AccessToken,

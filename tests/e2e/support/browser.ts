@@ -22,14 +22,15 @@ export const windows = {
 
 let browser: Promise<Browser> | undefined;
 
-function launch_browser(): Promise<Browser> {
+/** `without`: arguments of the test tools that this browser does not get. It ends with this process. */
+export function launch_browser(without: string[] = []): Promise<Browser> {
   if (!existsSync(chromium_path)) {
     throw new Error(`no Chromium at ${chromium_path}: apt install chromium, or set CATGS_CHROMIUM`);
   }
-  // It ends with this process.
   return chromium.launch({
     executablePath: chromium_path,
     headless: true,
+    ignoreDefaultArgs: without,
     args: [
       '--no-sandbox',
       '--disable-gpu',

@@ -52,6 +52,7 @@ export interface FakeServer {
 interface Offer {
   readonly scenes?: readonly Partial<SceneListing>[];
   readonly poster?: Uint8Array;
+  readonly before_worker?: string; // runs before the script of the worker
   readonly tours?: readonly object[]; // of every scene, as a sidecar has them
 }
 
@@ -69,7 +70,12 @@ export const refuse = (code: Error_Code, message: string): Script =>
 
 export async function start_fake_server(
   script: Script,
-  { scenes = [{ id: 'city', title: 'Demo city' }], poster, tours = [] }: Offer = {},
+  {
+    scenes = [{ id: 'city', title: 'Demo city' }],
+    poster,
+    tours = [],
+    before_worker = '',
+  }: Offer = {},
 ): Promise<FakeServer> {
   const http = createServer((request, response) => {
     const name = new URL(request.url ?? '/', 'http://localhost').pathname;
@@ -93,6 +99,7 @@ export async function start_fake_server(
           'content-type': content_types[path.extname(file)] ?? 'application/octet-stream',
           'content-security-policy': policy,
         });
+        if (name.includes('/worker-')) response.write(before_worker);
         response.end(body);
       },
       () => response.writeHead(404).end(),

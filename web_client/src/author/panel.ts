@@ -47,7 +47,7 @@ export class AuthorPanel {
   private made_from_: SidecarTag;
   private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
   private start_: Eye | undefined; // as the page has heard
-  private saved_: unknown; // the state of the draft that is saved; undefined: the scene has changed besides
+  private saved_: unknown = this.draft_.state; // the state of the draft that is saved; undefined: the scene has changed besides
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
@@ -117,6 +117,10 @@ export class AuthorPanel {
     this.told();
   }
 
+  get is_unsaved(): boolean {
+    return this.saved_ !== this.draft_.state;
+  }
+
   /** Which way is up is no longer as it was saved. */
   scene_changed(): void {
     this.saved_ = undefined;
@@ -140,9 +144,9 @@ export class AuthorPanel {
       this.title_.focus();
     });
     this.tour_.addEventListener('change', () => {
-      const is_saved = this.saved_ === draft.state;
+      const was_unsaved = this.is_unsaved;
       draft.choose(Number(this.tour_.value));
-      if (is_saved) this.saved_ = draft.state;
+      if (!was_unsaved) this.saved_ = draft.state;
       this.edited(0);
     });
     this.title_.addEventListener('input', () => {
@@ -170,7 +174,7 @@ export class AuthorPanel {
     on_click('author-replace', () => void this.save(this.theirs_));
     on_click('author-download', () => this.download());
     window.addEventListener('beforeunload', (event) => {
-      if (this.saved_ !== draft.state) event.preventDefault();
+      if (this.is_unsaved) event.preventDefault();
     });
   }
 

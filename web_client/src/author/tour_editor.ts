@@ -46,6 +46,7 @@ export class TourEditor {
       media,
       start_at: (eye) => camera.start_at(eye ?? this.first_start_),
     });
+    toolbar.keep_usable('author', () => this.panel_.is_unsaved);
     navigation.up_changed.listen(() => this.panel_.scene_changed());
   }
 

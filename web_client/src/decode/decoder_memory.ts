@@ -1,4 +1,5 @@
 // Remembers decoders that failed in this browser, so that the next visit does not try them again.
+import type { KeptTexts } from '../base/browser_storage';
 import { decoder_ladder, type DecoderRung } from './ladder';
 
 const storage_key = 'catgs.decoder';
@@ -11,13 +12,9 @@ interface Remembered {
 }
 
 /** The rung to begin with: the top one, unless decoders of this browser failed recently. */
-export function remembered_rung(
-  storage: Storage | undefined,
-  agent: string,
-  now_ms: number,
-): DecoderRung {
+export function remembered_rung(storage: KeptTexts, agent: string, now_ms: number): DecoderRung {
   try {
-    const text = storage?.getItem(storage_key);
+    const text = storage.getItem(storage_key);
     const memory = text ? (JSON.parse(text) as Partial<Remembered>) : {};
     const known = decoder_ladder.find((rung) => rung === memory.rung);
     if (known && memory.agent === agent && (memory.until_ms ?? 0) > now_ms) return known;
@@ -29,14 +26,10 @@ export function remembered_rung(
 
 export function remember_rung(
   rung: DecoderRung,
-  storage: Storage | undefined,
+  storage: KeptTexts,
   agent: string,
   now_ms: number,
 ): void {
   const memory: Remembered = { rung, agent, until_ms: now_ms + keep_ms };
-  try {
-    storage?.setItem(storage_key, JSON.stringify(memory));
-  } catch (error) {
-    console.warn('the choice of decoder cannot be remembered', error); // storage is full
-  }
+  storage.setItem(storage_key, JSON.stringify(memory));
 }

@@ -1,5 +1,7 @@
 // From received bytes to the picture that is shown: decoder, newest-wins slot, presenter, and one
-// acknowledgement per frame, whatever became of it.
+// acknowledgement per frame, whatever became of it. Each step has a longest time.
+import type { Timers } from '../base/clock';
+import { after_awake, in_time, longest_step_s } from '../base/patience';
 import { Codec, type AckInit, type FrameHeader, type StreamConfig } from '../wire/wire';
 import { failures_per_rung } from './ladder';
 import { Latest } from './latest';
@@ -7,6 +9,7 @@ import type { Decoder, DecoderEvents, EncodedFrame, Frame, Picture } from './pic
 
 export interface PipelineEnvironment {
   now_us: () => number;
+  timers: Timers;
   /** A new decoder for the stream; undefined when this browser has none (left). */
   make_decoder: (
     config: StreamConfig,
@@ -38,7 +41,11 @@ export class FramePipeline {
   private streams_ended_ = 0;
   private failures_ = 0;
   private needs_key_ = true;
+  private hidden_ = false;
+  private gave_picture_ = false; // the decoder
   private waiting_: EncodedFrame[] = [];
+  private readonly inside_ = new Set<Frame>(); // the decoder
+  private cancel_watch_: () => void = () => undefined;
   private drawing_ = false;
   private readonly newest_: Latest<{ frame: Frame; picture: Picture }>;
 
@@ -68,13 +75,13 @@ export class FramePipeline {
   push(header: FrameHeader, payload: Uint8Array): void {
     const received_us = this.env_.now_us();
     const frame = { header, payload, received_us, decoded_us: 0 };
-    if (this.needs_key_ && !header.idr) {
+    if ((this.needs_key_ && !header.idr) || (this.hidden_ && !this.decoder_)) {
       this.drop(frame);
       return;
     }
     this.needs_key_ = false;
     if (this.decoder_) {
-      this.decoder_.decode(frame);
+      this.decode(this.decoder_, frame);
     } else if (this.waiting_.length < waiting_limit) {
       this.waiting_.push(frame);
     } else {
@@ -83,15 +90,21 @@ export class FramePipeline {
     }
   }
 
-  /** Forgets what is not shown yet: the page is hidden, and nothing will be drawn. */
-  discard_pending(): void {
+  /** A hidden page draws nothing, and makes no decoder: browsers take decoders back from hidden pages. */
+  set hidden(hidden: boolean) {
+    this.hidden_ = hidden;
     this.newest_.clear();
+    this.watch();
+    if (hidden || this.decoder_ || !this.config_) return;
+    void this.renew_decoder();
+    this.listener_.key_frame_wanted();
   }
 
   /** Drops every frame inside: the stream they belong to has ended. What is shown stays shown. */
   end_stream(): void {
     this.generation_ += 1;
     this.streams_ended_ += 1;
+    this.cancel_watch_();
     this.decoder_?.close();
     this.decoder_ = undefined;
     this.drop_waiting();
@@ -104,20 +117,36 @@ export class FramePipeline {
     const generation = ++this.generation_;
     this.decoder_?.close();
     this.decoder_ = undefined;
+    this.cancel_watch_();
     this.drop_waiting();
     this.needs_key_ = true;
+    this.gave_picture_ = false;
     const config = this.config_;
-    if (!config) return;
-    const decoder = await this.env_.make_decoder(config, this.failures_, {
+    if (!config || this.hidden_) return;
+    const failed = (error: unknown): void => {
+      if (generation === this.generation_) this.failed(error);
+    };
+    const made = this.env_.make_decoder(config, this.failures_, {
       decoded: (frame, picture) => {
         if (generation === this.generation_) this.decoded(frame, picture);
         else picture.close();
       },
-      skipped: (frame) => this.drop(frame),
-      failed: (error) => {
-        if (generation === this.generation_) this.failed(error);
+      skipped: (frame) => {
+        this.drop(frame);
+        if (generation === this.generation_) this.watch();
       },
+      failed,
     });
+    let decoder;
+    try {
+      decoder = await in_time(this.env_.timers, made);
+    } catch (error) {
+      made.then(
+        (late) => late?.close(),
+        () => undefined,
+      );
+      return failed(error);
+    }
     if (generation !== this.generation_) {
       decoder?.close();
     } else if (!decoder) {
@@ -127,17 +156,34 @@ export class FramePipeline {
       this.decoder_ = decoder;
       for (const frame of this.waiting_.splice(0)) {
         // A frame on which it fails closes it; those behind need another key frame anyway.
-        if (generation === this.generation_) decoder.decode(frame);
+        if (generation === this.generation_) this.decode(decoder, frame);
         else this.drop(frame);
       }
     }
   }
 
-  private failed(error: Error): void {
+  private decode(decoder: Decoder, frame: EncodedFrame): void {
+    this.inside_.add(frame);
+    if (this.inside_.size === 1) this.watch();
+    decoder.decode(frame);
+  }
+
+  /** Waits for the next sign of life of the decoder: some give neither a picture nor an error. */
+  private watch(): void {
+    this.cancel_watch_();
+    if (this.inside_.size === 0 || this.hidden_) return;
+    this.cancel_watch_ = after_awake(this.env_.timers, longest_step_s, () =>
+      this.failed(new Error('the decoder gives neither a picture nor an error')),
+    );
+  }
+
+  /** A decoder that worked until the browser took it back has not failed. */
+  private failed(error: unknown): void {
     console.warn('video decoder failed', error);
-    this.failures_ += 1;
+    const is_reclaimed = error instanceof Error && error.name === 'QuotaExceededError';
+    if (!this.hidden_ && !(is_reclaimed && this.gave_picture_)) this.failures_ += 1;
     void this.renew_decoder();
-    this.listener_.key_frame_wanted();
+    if (!this.hidden_) this.listener_.key_frame_wanted();
   }
 
   private want_key_frame(): void {
@@ -151,7 +197,11 @@ export class FramePipeline {
   }
 
   private decoded(frame: Frame, picture: Picture): void {
+    this.inside_.delete(frame);
+    this.gave_picture_ = true;
+    this.watch();
     this.newest_.put({ frame, picture });
+    if (this.hidden_) return this.newest_.clear();
     if (!this.drawing_) this.draw_at_refresh();
   }
 
@@ -170,19 +220,28 @@ export class FramePipeline {
     if (!newest) return;
     const { frame, picture } = newest;
     const streams_ended = this.streams_ended_;
+    let error: unknown;
     try {
-      await this.env_.draw(picture, frame.header);
+      await in_time(this.env_.timers, this.env_.draw(picture, frame.header));
+    } catch (thrown) {
+      error = thrown ?? new Error('the picture cannot be drawn');
     } finally {
       picture.close();
     }
     // The connection went while the picture was drawn: nobody waits for the acknowledgement.
     if (this.streams_ended_ !== streams_ended) return;
+    if (error !== undefined) {
+      this.drop(frame);
+      this.failed(error); // another way to decode may give pictures that can be drawn
+      return;
+    }
     const presented_us = this.env_.now_us();
     this.ack(frame, presented_us);
     this.listener_.presented(frame, presented_us);
   }
 
   private drop(frame: Frame): void {
+    this.inside_.delete(frame);
     this.ack(frame, 0);
     this.listener_.dropped(frame);
   }

@@ -1,3 +1,5 @@
+import type { Timers } from '../base/clock';
+import { in_time } from '../base/patience';
 import { Codec, type StreamConfig } from '../wire/wire';
 import { Latest } from './latest';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
@@ -12,6 +14,7 @@ export class JpegDecoder implements Decoder {
 
   constructor(
     private readonly now_us_: () => number,
+    private readonly timers_: Timers,
     private readonly events_: DecoderEvents,
   ) {}
 
@@ -41,8 +44,9 @@ export class JpegDecoder implements Decoder {
 
   private async decode_one(frame: EncodedFrame): Promise<void> {
     const blob = new Blob([frame.payload as Uint8Array<ArrayBuffer>], { type: 'image/jpeg' });
+    const made = createImageBitmap(blob, { colorSpaceConversion: 'none' });
     try {
-      const picture = await createImageBitmap(blob, { colorSpaceConversion: 'none' });
+      const picture = await in_time(this.timers_, made);
       if (this.current_ !== frame) {
         picture.close(); // the decoder was closed meanwhile
         return;
@@ -52,6 +56,10 @@ export class JpegDecoder implements Decoder {
     } catch (error) {
       // A broken JPEG spoils no other frame, so it needs neither a reset nor a key frame.
       console.warn('JPEG frame not decodable', error);
+      made.then(
+        (late) => late.close(),
+        () => undefined,
+      );
       if (this.current_ === frame) this.events_.skipped(frame);
     }
   }

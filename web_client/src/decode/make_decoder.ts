@@ -1,3 +1,4 @@
+import type { Timers } from '../base/clock';
 import { Codec, type StreamConfig } from '../wire/wire';
 import { JpegDecoder } from './jpeg_decoder';
 import { failures_per_rung, rungs_from, type DecoderRung } from './ladder';
@@ -23,16 +24,17 @@ export async function make_decoder(
   first_rung: DecoderRung,
   failures: number,
   now_us: () => number,
+  timers: Timers,
   events: DecoderEvents,
 ): Promise<MadeDecoder | undefined> {
   if (config.codec === Codec.MJPEG) {
-    return { decoder: new JpegDecoder(now_us, events), rung: 'jpeg' };
+    return { decoder: new JpegDecoder(now_us, timers, events), rung: 'jpeg' };
   }
   if (config.codec !== Codec.H264 || !has_webcodecs()) return undefined;
   const rungs = await Promise.all(
     rungs_from(first_rung).map(async (rung) => {
       if (rung === 'jpeg') return [];
-      return (await is_supported(decoder_config(config, rung))) ? [rung] : [];
+      return (await is_supported(decoder_config(config, rung), timers)) ? [rung] : [];
     }),
   );
   const rung = rungs.flat()[Math.floor(failures / failures_per_rung)];

@@ -1,3 +1,5 @@
+import type { Timers } from '../base/clock';
+import { in_time } from '../base/patience';
 import { Codec, type StreamConfig } from '../wire/wire';
 import type { Decoder, DecoderEvents, EncodedFrame } from './picture';
 
@@ -19,8 +21,13 @@ export function decoder_config(
   };
 }
 
-export async function is_supported(config: VideoDecoderConfig): Promise<boolean> {
-  return (await VideoDecoder.isConfigSupported(config)).supported === true;
+export async function is_supported(config: VideoDecoderConfig, timers: Timers): Promise<boolean> {
+  try {
+    return (await in_time(timers, VideoDecoder.isConfigSupported(config))).supported === true;
+  } catch (error) {
+    console.warn('the browser does not say whether it decodes', config, error);
+    return false;
+  }
 }
 
 /** Decodes H.264 with WebCodecs. One frame gives one picture; the frame id travels as the timestamp. */
@@ -63,8 +70,13 @@ export class WebCodecsDecoder implements Decoder {
   /** A stream that the decoder cannot play after all shows up as a failure. */
   reconfigure(config: StreamConfig): boolean {
     if (config.codec !== Codec.H264 || this.decoder_.state !== 'configured') return false;
-    this.decoder_.configure(decoder_config(config, this.acceleration_));
-    return true;
+    try {
+      this.decoder_.configure(decoder_config(config, this.acceleration_));
+      return true;
+    } catch (error) {
+      console.warn('the decoder takes no other stream', error);
+      return false;
+    }
   }
 
   close(): void {

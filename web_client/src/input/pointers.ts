@@ -9,6 +9,7 @@ export interface PointerSample {
   y: number;
   buttons: number;
   shift: boolean;
+  primary: boolean; // no other one of its type is down
 }
 
 /**
@@ -22,6 +23,7 @@ export interface Pointed {
 }
 
 interface Held {
+  readonly type: string;
   x: number;
   y: number;
 }
@@ -30,8 +32,14 @@ const primary_button = 1;
 // Spreading two fingers by this factor equals one notch of a wheel.
 const pinch_factor_per_step = 1.13;
 const wheel_px_per_step = 100;
+const longest_pinch_px = 50; // a mouse wheel with Ctrl gives more
+const pinch_factor = 8;
 const wheel_px_per_line = 33; // deltaMode 1: lines
 const wheel_px_per_page = 400; // deltaMode 2: pages
+
+/** Notches towards the scene. `factor`: by which two fingers are spread. */
+export const pinch_steps = (factor: number): number =>
+  factor > 0 ? Math.log(factor) / Math.log(pinch_factor_per_step) : 0;
 
 /**
  * Turns pointers into camera gestures. A mouse drag looks with the primary button, and pans with any
@@ -45,7 +53,17 @@ export class Pointers {
   }
 
   down(p: PointerSample): void {
-    if (this.held_.size < 2) this.held_.set(p.id, { x: p.x, y: p.y });
+    // Some drivers lose the end of a touch.
+    for (const [id, { type }] of this.held_)
+      if (p.primary && type === p.type) this.held_.delete(id);
+    if (this.held_.size < 2) this.held_.set(p.id, { type: p.type, x: p.x, y: p.y });
+  }
+
+  /** Returns whether a pointer was down. */
+  release_all(): boolean {
+    const was_held = this.held_.size > 0;
+    this.held_.clear();
+    return was_held;
   }
 
   /** Returns whether this was the last pointer. */
@@ -65,8 +83,7 @@ export class Pointers {
     if (before && after) {
       const gestures: Gesture[] = [{ kind: 'pan', dx: dx / 2, dy: dy / 2 }];
       if (before.spread > 0 && after.spread > 0) {
-        const steps = Math.log(after.spread / before.spread) / Math.log(pinch_factor_per_step);
-        gestures.push({ kind: 'dolly', steps });
+        gestures.push({ kind: 'dolly', steps: pinch_steps(after.spread / before.spread) });
       }
       return gestures;
     }
@@ -151,6 +168,8 @@ export class LongPress {
 export function wheel_steps(delta_y: number, delta_mode: number, ctrl: boolean): number {
   const px_per_unit =
     delta_mode === 1 ? wheel_px_per_line : delta_mode === 2 ? wheel_px_per_page : 1;
-  const steps = (-delta_y * px_per_unit * (ctrl ? 8 : 1)) / wheel_px_per_step;
+  const px = delta_y * px_per_unit;
+  const is_pinch = ctrl && Math.abs(px) < longest_pinch_px;
+  const steps = (-px * (is_pinch ? pinch_factor : 1)) / wheel_px_per_step;
   return Math.min(8, Math.max(-8, steps));
 }

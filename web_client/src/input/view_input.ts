@@ -2,9 +2,11 @@
 import { browser_timers } from '../base/clock';
 import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
+import { is_for_page, position_of } from './key';
 import { HeldKeys } from './keyboard';
 import {
   LongPress,
+  pinch_steps,
   Pointers,
   Taps,
   wheel_steps,
@@ -31,8 +33,16 @@ export function bind_view_input(
 ): { keys: HeldKeys; pointers: Pointers } {
   const keys = new HeldKeys();
   const pointers = new Pointers();
-  bind_pointers(view, pointers, inertia, listener);
+  const release = bind_pointers(view, pointers, inertia, listener);
+  bind_wheel(view, inertia, listener);
+  view.addEventListener('contextmenu', (event) => event.preventDefault());
   bind_keys(keys, listener);
+  // What was let go elsewhere is not heard of here.
+  window.addEventListener('blur', () => keys.release_all());
+  document.addEventListener('visibilitychange', () => {
+    keys.release_all();
+    release();
+  });
   bind_focus(view);
   return { keys, pointers };
 }
@@ -42,7 +52,7 @@ function bind_pointers(
   pointers: Pointers,
   inertia: Inertia,
   listener: ViewInputListener,
-): void {
+): () => void {
   const taps = new Taps();
   const press = new LongPress(browser_timers);
   /** Shares of the view's width and height. */
@@ -63,12 +73,19 @@ function bind_pointers(
       });
     }
     if (event.button === 1) event.preventDefault(); // no scrolling by the middle button
-    view.setPointerCapture(event.pointerId);
+    capture(view, event.pointerId);
     inertia.stop();
     pointers.down(sample_of(event));
     taps.down(event.clientX, event.clientY, pointers.count === 1 && event.button === 0);
   });
+  /** The pointer went up, or its end was lost. */
+  const ended = (id: number): boolean => {
+    press.end();
+    return pointers.up(id);
+  };
   view.addEventListener('pointermove', (event) => {
+    if (event.buttons === 0 && event.pointerType !== 'touch')
+      return ended(event.pointerId) ? listener.let_go() : undefined;
     // Until it is a drag, the camera hears nothing of it: a participant's would leave the host.
     if (press.may_come(event.clientX, event.clientY)) return;
     for (const gesture of pointers.move(sample_of(event), view.clientHeight)) {
@@ -78,8 +95,7 @@ function bind_pointers(
   });
   for (const end of ['pointerup', 'pointercancel', 'lostpointercapture'] as const) {
     view.addEventListener(end, (event) => {
-      press.end();
-      const lifted = pointers.up(event.pointerId);
+      const lifted = ended(event.pointerId);
       if (end === 'pointercancel') taps.cancel();
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
@@ -94,27 +110,58 @@ function bind_pointers(
       }
     });
   }
-  view.addEventListener('contextmenu', (event) => event.preventDefault());
+  return () => {
+    press.end();
+    taps.cancel();
+    if (pointers.release_all()) listener.let_go();
+  };
+}
+
+function bind_wheel(view: HTMLElement, inertia: Inertia, listener: ViewInputListener): void {
   view.addEventListener(
     'wheel',
     (event) => {
       event.preventDefault();
+      // With Shift, systems turn a wheel into a sideways one.
+      const delta = event.deltaY || (event.shiftKey ? event.deltaX : 0);
+      const steps = wheel_steps(delta, event.deltaMode, event.ctrlKey);
+      if (steps === 0) return;
       inertia.stop();
-      listener.wheeled(wheel_steps(event.deltaY, event.deltaMode, event.ctrlKey), event.ctrlKey);
+      listener.wheeled(steps, event.ctrlKey);
     },
     { passive: false },
   );
+  // Safari on a Mac tells of the pinch of a trackpad like this, and on a phone besides the pointers.
+  let scale = 1;
+  for (const kind of ['gesturestart', 'gesturechange'])
+    view.addEventListener(kind, (event) => {
+      event.preventDefault();
+      const { scale: now } = event as Event & { readonly scale: number };
+      if (kind === 'gesturechange' && !('ontouchend' in window))
+        listener.wheeled(pinch_steps(now / scale), true);
+      scale = now;
+    });
+}
+
+/** Pointers that an assistive tool makes up, or that are up by now, cannot be captured. */
+function capture(view: HTMLElement, pointer_id: number): void {
+  try {
+    view.setPointerCapture(pointer_id);
+  } catch (error) {
+    console.warn('a pointer cannot be captured', error);
+  }
 }
 
 function bind_keys(keys: HeldKeys, listener: ViewInputListener): void {
   window.addEventListener('keydown', (event) => {
+    // While Cmd is held, macOS does not tell of keys that are let go.
+    if (event.metaKey) keys.release_all();
     if (!is_for_page(event)) return;
-    if (!keys.down(event.code, event.shiftKey)) return;
+    if (!keys.down(position_of(event), event.shiftKey)) return;
     event.preventDefault();
     listener.keys_changed();
   });
-  window.addEventListener('keyup', (event) => keys.up(event.code, event.shiftKey));
-  window.addEventListener('blur', () => keys.release_all());
+  window.addEventListener('keyup', (event) => keys.up(position_of(event), event.shiftKey));
 }
 
 /**
@@ -137,12 +184,6 @@ function bind_focus(view: HTMLElement): void {
   view.addEventListener('focus', mark);
 }
 
-/** Whether a key is ours, and neither a form field's nor a shortcut of the browser. */
-export function is_for_page({ ctrlKey, metaKey, altKey, target }: KeyboardEvent): boolean {
-  const is_typing = target instanceof HTMLElement && target.matches('input, select, textarea');
-  return !ctrlKey && !metaKey && !altKey && !is_typing;
-}
-
 function sample_of(event: PointerEvent): PointerSample {
   return {
     id: event.pointerId,
@@ -151,5 +192,6 @@ function sample_of(event: PointerEvent): PointerSample {
     y: event.clientY,
     buttons: event.buttons,
     shift: event.shiftKey,
+    primary: event.isPrimary,
   };
 }

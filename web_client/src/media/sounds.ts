@@ -1,5 +1,6 @@
 // What is heard: the voice of a stop, the sound of the tour, and films. It uses no page, so that tests can
 // drive it with fakes.
+import type { KeptTexts } from '../base/browser_storage';
 
 /** An <audio> element, or a fake. */
 export interface Playable {
@@ -15,7 +16,7 @@ interface SoundEnvironment {
   readonly background: Playable;
   /** Whether the visitor has touched the page. Browsers let nothing be heard before. */
   readonly touched: boolean;
-  readonly storage: Storage | undefined;
+  readonly storage: KeptTexts;
   /** The state has changed. */
   changed(): void;
 }
@@ -36,7 +37,7 @@ export class Sounds {
 
   constructor(private readonly env_: SoundEnvironment) {
     this.touched_ = env_.touched;
-    this.muted_ = env_.storage?.getItem(storage_key) === 'yes';
+    this.muted_ = env_.storage.getItem(storage_key) === 'yes';
   }
 
   get muted(): boolean {
@@ -121,7 +122,7 @@ export class Sounds {
   toggle(): void {
     this.muted_ = this.audible;
     this.touched_ = true;
-    this.env_.storage?.setItem(storage_key, this.muted_ ? 'yes' : 'no');
+    this.env_.storage.setItem(storage_key, this.muted_ ? 'yes' : 'no');
     this.update();
   }
 

@@ -1,5 +1,5 @@
 // The parts of the page that its larger features share.
-import { browser_storage } from '../base/browser_storage';
+import { browser_storage, type KeptTexts } from '../base/browser_storage';
 import { clock_from, type Clock } from '../base/clock';
 import type { AccessToken } from '../session/token';
 import { WorkerClient } from '../worker/client';
@@ -18,7 +18,7 @@ export interface PageParts {
   readonly toolbar: Toolbar;
   readonly notice: Notice;
   readonly token: AccessToken;
-  readonly storage: Storage | undefined;
+  readonly storage: KeptTexts;
   readonly reduced_motion: boolean;
 }
 

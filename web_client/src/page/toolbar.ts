@@ -1,6 +1,6 @@
 import { Signal } from '../base/signal';
 import type { CameraMode } from '../camera/mode';
-import { is_for_page } from '../input/view_input';
+import { is_for_page, letter_of } from '../input/key';
 import { text } from '../text/text';
 import { by_id, hint_at_more, on_click } from './dom';
 import type { Navigation } from './navigation';
@@ -19,6 +19,7 @@ export class Toolbar {
   private readonly bar_ = by_id('toolbar', HTMLElement);
   /** Whether another visitor moves the camera: then there is less to control. */
   watching = false;
+  private work_: { readonly panel: Panel; readonly is_unsaved: () => boolean } | undefined;
   private readonly small_screen_ = matchMedia(small_screen);
 
   constructor(private readonly navigation_: Navigation) {
@@ -41,8 +42,16 @@ export class Toolbar {
 
   /** Turns the toolbar off while there is nothing to control. A card then says why. */
   set_active(active: boolean): void {
-    this.bar_.inert = !active;
-    if (!active) this.close_all();
+    const kept = !active && this.work_?.is_unsaved() ? this.work_.panel : undefined;
+    this.bar_.inert = !active && !kept;
+    if (active) return;
+    for (const panel of panels) if (panel !== kept) this.close(panel);
+    if (kept) this.open(kept);
+  }
+
+  /** While this panel holds unsaved work, it stays usable, whatever becomes of the session. */
+  keep_usable(panel: Panel, is_unsaved: () => boolean): void {
+    this.work_ = { panel, is_unsaved };
   }
 
   open(panel: Panel): void {
@@ -60,19 +69,21 @@ export class Toolbar {
 
   private bind_keys(): void {
     const actions: Readonly<Record<string, () => void>> = {
-      KeyM: () => this.navigation_.next_mode(),
-      KeyR: () => this.navigation_.reset(),
-      KeyU: () => this.navigation_.turn_up(Math.PI),
-      KeyF: toggle_full_screen,
-      KeyI: () => this.toggle('stats'),
-      KeyH: () => this.toggle('help'),
+      M: () => this.navigation_.next_mode(),
+      R: () => this.navigation_.reset(),
+      U: () => this.navigation_.turn_up(Math.PI),
+      F: toggle_full_screen,
+      I: () => this.toggle('stats'),
+      H: () => this.toggle('help'),
       Escape: () => this.close_all(),
     };
     const faster: Readonly<Record<string, number>> = { '+': 2, '=': 2, '-': -2, _: -2 };
     window.addEventListener('keydown', (event) => {
-      if (this.bar_.inert || event.repeat || !is_for_page(event)) return;
-      if (this.watching && !(event.code in { KeyF: 1, KeyI: 1, Escape: 1 })) return;
-      actions[event.code]?.();
+      // A key that moves the camera has been taken: on some layouts it bears one of these letters.
+      if (this.bar_.inert || event.repeat || event.defaultPrevented || !is_for_page(event)) return;
+      const letter = letter_of(event);
+      if (this.watching && !['F', 'I', 'Escape'].includes(letter)) return;
+      actions[letter]?.();
       // By its sign, because its position differs from layout to layout.
       const steps = faster[event.key];
       if (steps) this.navigation_.faster(steps);

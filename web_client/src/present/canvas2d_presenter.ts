@@ -6,6 +6,7 @@ import { size_of, type Pixels, type Presenter } from './presenter';
 export class Canvas2dPresenter implements Presenter {
   readonly kind = 'canvas_2d';
   readonly can_warp = false;
+  readonly most_px = Infinity;
   private yuv_ = new Uint8Array(0);
   private image_: ImageData | undefined;
 

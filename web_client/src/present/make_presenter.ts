@@ -6,15 +6,20 @@ export type PresenterChoice = 'auto' | 'webgl2' | '2d';
 
 /**
  * Makes a WebGL2 presenter where a GPU runs it and a 2D canvas elsewhere, or the `wanted` one. Throws
- * where the browser has neither.
+ * where the browser has neither. `emptied`: the GPU has lost the canvas, which needs another picture.
  */
-export function make_presenter(canvas: OffscreenCanvas, wanted: PresenterChoice): Presenter {
+export function make_presenter(
+  canvas: OffscreenCanvas,
+  wanted: PresenterChoice,
+  emptied: () => void,
+): Presenter {
   const attributes: WebGLContextAttributes = { alpha: false, antialias: false, depth: false };
   if (wanted === 'webgl2' || (wanted === 'auto' && has_hardware_webgl2())) {
     const gl = canvas.getContext('webgl2', attributes);
-    if (gl) return new WebGl2Presenter(canvas, gl);
+    if (gl) return new WebGl2Presenter(canvas, gl, emptied);
   }
   const context = canvas.getContext('2d', { alpha: false });
+  canvas.addEventListener('contextrestored', emptied);
   if (context) return new Canvas2dPresenter(canvas, context);
   throw new Error('this browser offers neither WebGL2 nor a 2D canvas to a worker');
 }

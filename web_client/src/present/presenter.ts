@@ -28,6 +28,8 @@ export interface Presenter {
   readonly kind: PresenterKind;
   /** Whether it uses placings and can redraw. */
   readonly can_warp: boolean;
+  /** The longest side of a picture that it can draw. */
+  readonly most_px: number;
   /** The promise resolves when the picture may be closed. Only one draw runs at a time. */
   draw(picture: Picture, placing?: Placing): Promise<void>;
   /** Draws the last picture again with another placing. Only for presenters that can warp. */

@@ -29,16 +29,22 @@ const unmoved: Matrix3 = new Float32Array([1, 0, 0, 0, 1, 0, 0, 0, 1]);
 export class WebGl2Presenter implements Presenter {
   readonly kind = 'webgl2';
   readonly can_warp = true;
+  readonly most_px: number;
   private matrix_location_: WebGLUniformLocation | null = null;
 
   constructor(
     private readonly canvas_: OffscreenCanvas,
     private readonly gl_: WebGL2RenderingContext,
+    emptied: () => void,
   ) {
+    this.most_px = Number(gl_.getParameter(gl_.MAX_TEXTURE_SIZE)) || Infinity; // null: lost already
     this.set_up();
     // A lost context comes back empty. The canvas is an EventTarget in the worker, too.
     canvas_.addEventListener('webglcontextlost', (event) => event.preventDefault());
-    canvas_.addEventListener('webglcontextrestored', () => this.set_up());
+    canvas_.addEventListener('webglcontextrestored', () => {
+      this.set_up();
+      emptied();
+    });
   }
 
   draw(picture: Picture, placing?: Placing): Promise<void> {

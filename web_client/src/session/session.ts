@@ -149,9 +149,9 @@ export class Session {
     this.send({ case: 'pause', value: { paused } });
   }
 
-  /** Says good-bye; the session is over. */
+  /** Says good-bye, also in a queue and to the server that takes over. retry() continues where the visitor was. */
   stop(): void {
-    this.send({ case: 'bye', value: {} });
+    for (const link of [this.link_, this.successor_]) link?.send({ case: 'bye', value: {} });
     this.drop_links();
   }
 

@@ -1,3 +1,5 @@
+import type { KeptTexts } from '../base/browser_storage';
+
 const storage_key = 'catgs.token';
 const most_bytes = 512; // that the wire takes
 
@@ -30,9 +32,9 @@ export class AccessToken {
   constructor(
     location: Pick<Location, 'href'>,
     history: Pick<History, 'replaceState' | 'state'>,
-    private readonly storage_: Storage | undefined,
+    private readonly storage_: KeptTexts,
   ) {
-    this.value_ = storage_?.getItem(storage_key) ?? '';
+    this.value_ = storage_.getItem(storage_key) ?? '';
     const url = new URL(location.href);
     const fragment = fragment_of(location.href);
     const token = fragment.get('token');
@@ -54,6 +56,6 @@ export class AccessToken {
 
   set value(token: string) {
     this.value_ = token;
-    this.storage_?.setItem(storage_key, token);
+    this.storage_.setItem(storage_key, token);
   }
 }

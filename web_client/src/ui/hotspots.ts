@@ -22,9 +22,9 @@ export class Hotspots {
     private readonly scenes_: PortalScenes,
     private readonly go_to_: (stop_index: number) => void,
   ) {
-    window.addEventListener('keydown', ({ code }) => {
+    window.addEventListener('keydown', ({ key }) => {
       // A label may hide what is behind it (WCAG 1.4.13).
-      if (code === 'Escape') this.host_.classList.add('labels-dismissed');
+      if (key === 'Escape') this.host_.classList.add('labels-dismissed');
     });
     seen.moved.listen((eye) => this.put(eye));
   }

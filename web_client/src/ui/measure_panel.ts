@@ -34,9 +34,9 @@ export class MeasurePanel {
     this.lines_.setAttribute('aria-hidden', 'true');
     by_id('hotspots', HTMLElement).before(this.lines_);
     this.system_.value =
-      systems.find((system) => system === storage?.getItem(system_key)) ?? system_here();
+      systems.find((system) => system === storage.getItem(system_key)) ?? system_here();
     this.system_.addEventListener('change', () => {
-      storage?.setItem(system_key, this.system_.value);
+      storage.setItem(system_key, this.system_.value);
       this.show();
     });
     on_click('measure-middle', () => void this.mark(0.5, 0.5));

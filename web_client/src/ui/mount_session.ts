@@ -17,16 +17,15 @@ import type { StreamSize } from './stream_size';
 import { TurnCall } from './turn_call';
 import { jpeg_reason } from './wording';
 
-/** Returns what shows a fatal error of the page. `scene_id`: empty for the server's first scene. */
+/** Returns what tells of an error of the page. `scene_id`: empty for the server's first scene. */
 export function mount_session(
   { worker, notice, toolbar, token, storage }: PageParts,
   card: CardView,
   stream_size: StreamSize,
   scene_id: string,
 ): (message: string) => void {
-  const status = new SessionStatus(card, toolbar, worker, token);
+  const status = new SessionStatus(card, notice, toolbar, worker, token);
   new TurnCall(card, notice, worker);
-  bind_page_events(worker);
   worker.on('welcome', ({ welcome: { scene, sceneIds } }) => {
     if (scene) show_scene_title(scene, sceneIds.length > 1);
   });
@@ -67,9 +66,10 @@ export function mount_session(
     },
     [canvas],
   );
+  bind_page_events(worker);
   const reason = jpeg_reason(has_webcodecs(), isSecureContext, rung);
   if (reason) tell_of_jpeg((jpeg) => jpeg[reason]);
-  return (message) => status.break_off(message);
+  return (message) => status.failed(message);
 }
 
 const device_here = (): ReturnType<typeof device_kind> =>

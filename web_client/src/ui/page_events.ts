@@ -2,7 +2,8 @@ import { has_token, watch_token } from '../session/token';
 import type { WorkerClient } from '../worker/client';
 
 /**
- * Tells the worker when the page is hidden, is online again, or closes. A link with a token that is opened
+ * Tells the worker when the page is hidden, is online again, or is left. Browsers keep pages that are left, and show
+ * them again: meanwhile such a page has no visit. A link with a token that is opened
  * in this tab changes no more than the fragment, and the page begins anew with it.
  */
 export function bind_page_events(worker: WorkerClient): void {
@@ -10,9 +11,9 @@ export function bind_page_events(worker: WorkerClient): void {
   worker.on('state', ({ state }) => {
     waits = state.phase === 'waiting';
   });
-  document.addEventListener('visibilitychange', () => {
-    worker.post({ kind: 'hidden', hidden: document.hidden });
-  });
+  const look = (): void => worker.post({ kind: 'hidden', hidden: document.hidden });
+  document.addEventListener('visibilitychange', look);
+  if (document.hidden) look();
   window.addEventListener('online', () => {
     if (waits) worker.post({ kind: 'retry' });
   });
@@ -21,7 +22,8 @@ export function bind_page_events(worker: WorkerClient): void {
     const other = watch_token(location.href);
     if (has_token(location.href) || (other && other !== watched)) location.reload();
   });
-  window.addEventListener('pagehide', (event) => {
-    if (!event.persisted) worker.post({ kind: 'stop' });
+  window.addEventListener('pagehide', () => worker.post({ kind: 'leave' }));
+  window.addEventListener('pageshow', ({ persisted }) => {
+    if (persisted) worker.post({ kind: 'come_back' });
   });
 }

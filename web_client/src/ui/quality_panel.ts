@@ -1,3 +1,4 @@
+import type { KeptTexts } from '../base/browser_storage';
 import { by_id, on_click } from '../page/dom';
 import type { Navigation } from '../page/navigation';
 import type { WarpMode } from '../present/warp_policy';
@@ -22,7 +23,7 @@ export class QualityPanel {
     private readonly navigation_: Navigation,
     stream_size: StreamSize,
     worker: WorkerClient,
-    private readonly storage_: Storage | undefined,
+    private readonly storage_: KeptTexts,
   ) {
     const size = by_id('quality-size', HTMLSelectElement);
     const fps = by_id('quality-fps', HTMLSelectElement);
@@ -39,7 +40,7 @@ export class QualityPanel {
     this.speed_.addEventListener('input', () =>
       navigation_.set_speed(2 ** this.speed_.valueAsNumber),
     );
-    const kept = Number(storage_?.getItem(speed_key));
+    const kept = Number(storage_.getItem(speed_key));
     if (kept > 0) navigation_.set_speed(kept);
     for (const [id, turns] of [
       ['up-left', 0.25],
@@ -69,7 +70,7 @@ export class QualityPanel {
     const { speed } = this.navigation_.camera;
     this.speed_.value = String(Math.log2(speed));
     this.speed_value_.textContent = factor(speed);
-    this.storage_?.setItem(speed_key, String(speed));
+    this.storage_.setItem(speed_key, String(speed));
   }
 }
 

@@ -1,3 +1,4 @@
+import type { Notice } from '../page/notice';
 import type { Toolbar } from '../page/toolbar';
 import { list_scenes, type SceneListing } from '../session/scenes';
 import type { SessionState } from '../session/state';
@@ -5,7 +6,7 @@ import type { AccessToken } from '../session/token';
 import { Error_Code } from '../wire/wire';
 import type { WorkerClient } from '../worker/client';
 import type { CardView } from './card';
-import { broken_card, card_for } from './wording';
+import { broken_card, card_for, failure_note } from './wording';
 
 const first_card_after_ms = 300; // a fast connection shows its picture without a flash of cards
 
@@ -15,9 +16,11 @@ export class SessionStatus {
   private has_picture_ = false;
   private scenes_: readonly SceneListing[] = [];
   private broken_ = false;
+  private told_ = false;
 
   constructor(
     private readonly card_: CardView,
+    private readonly notice_: Notice,
     private readonly toolbar_: Toolbar,
     private readonly worker_: WorkerClient,
     private readonly token_: AccessToken,
@@ -28,6 +31,7 @@ export class SessionStatus {
       this.has_picture_ = true;
       this.show();
     });
+    worker_.on('error', ({ message }) => this.failed(message));
     worker_.on('broken', ({ message }) => this.break_off(message));
     card_.retried.listen(() => worker_.post({ kind: 'retry' }));
     card_.token_given.listen((token) => {
@@ -38,8 +42,15 @@ export class SessionStatus {
     setTimeout(() => this.show(), first_card_after_ms);
   }
 
+  /** Something in the page failed. Without a picture the page cannot go on. */
+  failed(message: string): void {
+    if (!this.has_picture_) return this.break_off(message);
+    if (!this.told_) this.notice_.show(failure_note(message));
+    this.told_ = true; // it may fail in every frame
+  }
+
   /** Ends the session for good. The card with the error stays. */
-  break_off(message: string): void {
+  private break_off(message: string): void {
     this.broken_ = true;
     this.worker_.post({ kind: 'stop' });
     this.toolbar_.set_active(false);

@@ -1,5 +1,5 @@
 import { CaptionView, prepare } from '../captions/caption';
-import { is_for_page } from '../input/view_input';
+import { is_for_page, position_of } from '../input/key';
 import { by_id, hint_at_more, on_click } from '../page/dom';
 import { language, text } from '../text/text';
 import type { TourPlayer, TourState } from '../tour/player';
@@ -37,12 +37,12 @@ export class TourView {
     };
     window.addEventListener('keydown', (event) => {
       if (
-        event.code === 'Space' &&
+        position_of(event) === 'Space' &&
         event.target instanceof Element &&
         event.target.closest('button, summary')
       )
         return; // a click
-      const action = actions[event.code];
+      const action = actions[position_of(event)];
       if (!action || !this.has_tours_ || !is_for_page(event)) return;
       event.preventDefault();
       action();

@@ -136,6 +136,10 @@ export function broken_card(message: string): Card {
   };
 }
 
+/** The same for an error that the page survives. */
+export const failure_note = (message: string): string =>
+  sentence(cards.broken.title) + sentence(message) + cards.broken.text;
+
 /** The card that names what the browser lacks; undefined when it lacks nothing. */
 export function unsupported_card(
   scope: Partial<Pick<typeof globalThis, 'Worker' | 'OffscreenCanvas' | 'WebSocket'>>,

@@ -3,7 +3,7 @@ import { browser_timers } from '../base/clock';
 import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import { is_for_page } from '../input/view_input';
+import { is_for_page } from '../input/key';
 import { by_id } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
@@ -55,7 +55,7 @@ export class WalkableArea {
       this.walk();
     });
     window.addEventListener('keydown', (event) => {
-      if (event.code === 'Escape' && is_for_page(event)) this.house_?.leave();
+      if (event.key === 'Escape' && is_for_page(event)) this.house_?.leave();
     });
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'plan' && shown) this.open_plan().catch(warn);

@@ -1,4 +1,5 @@
 // The floor plan: a small map that follows the visitor, or the whole storey.
+import type { KeptTexts } from '../base/browser_storage';
 import { dot, forward, length, rotate, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { by_id, icon, make } from '../page/dom';
@@ -31,7 +32,7 @@ const accent = '#1f6feb';
 const participant_colour = '#b3477d';
 
 interface PlanParts {
-  readonly storage: Storage | undefined;
+  readonly storage: KeptTexts;
   /** The visitor has chosen a point on the floor. */
   readonly go_to: (stand: Stand) => void;
   readonly go_to_stop: (index: number) => void;
@@ -97,11 +98,11 @@ export class PlanPanel {
       this.choose_storey(Number(this.storeys_.value));
       if (parts_.dollhouse?.shown) parts_.dollhouse.show(this.storey_);
     });
-    this.view_up_.setAttribute('aria-pressed', String(parts_.storage?.getItem(up_key) === 'view'));
+    this.view_up_.setAttribute('aria-pressed', String(parts_.storage.getItem(up_key) === 'view'));
     this.view_up_.addEventListener('click', () => {
       const view_up = this.view_up_.getAttribute('aria-pressed') !== 'true';
       this.view_up_.setAttribute('aria-pressed', String(view_up));
-      parts_.storage?.setItem(up_key, view_up ? 'view' : 'north');
+      parts_.storage.setItem(up_key, view_up ? 'view' : 'north');
       this.draw_soon();
     });
     this.size_.addEventListener('click', () => this.set_large(!this.is_large));

@@ -1,4 +1,6 @@
 // The page's end of the worker.
+import { browser_timers } from '../base/clock';
+import { after_awake } from '../base/patience';
 import { Signal } from '../base/signal';
 import type { StatsReport } from '../stats/metrics';
 import { text } from '../text/text';
@@ -7,6 +9,8 @@ import type { FromWorker, Snapshot, ToWorker } from './messages';
 type Answer = StatsReport | Snapshot | undefined;
 type Said = Exclude<FromWorker, { kind: 'stats' } | { kind: 'snapshot' }>;
 type SaidOf<K extends Said['kind']> = Extract<Said, { kind: K }>;
+
+const longest_answer_s = 15;
 
 export class WorkerClient {
   private readonly worker_ = new Worker(new URL('./worker.ts', import.meta.url), {
@@ -25,9 +29,13 @@ export class WorkerClient {
     };
     this.worker_.onerror = (event) => {
       // The event has no message when the worker could not be loaded at all.
-      const message = event.message || text.cards.broken.no_worker;
-      this.signals_.get('broken')?.emit({ kind: 'broken', message });
+      if (!event.message) this.break_off(text.cards.broken.no_worker);
+      else this.signals_.get('error')?.emit({ kind: 'error', message: event.message });
     };
+  }
+
+  private break_off(message: string): void {
+    this.signals_.get('broken')?.emit({ kind: 'broken', message });
   }
 
   on<K extends Said['kind']>(kind: K, listener: (message: SaidOf<K>) => void): void {
@@ -52,7 +60,15 @@ export class WorkerClient {
   private ask(kind: 'get_stats' | 'get_snapshot'): Promise<Answer> {
     const request = ++this.requests_;
     return new Promise((resolve) => {
-      this.waiting_.set(request, resolve);
+      // A worker that the browser has ended says nothing.
+      const cancel = after_awake(browser_timers, longest_answer_s, () => {
+        this.waiting_.delete(request);
+        this.break_off(text.cards.broken.no_worker);
+      });
+      this.waiting_.set(request, (answer) => {
+        cancel();
+        resolve(answer);
+      });
       this.post({ kind, request });
     });
   }

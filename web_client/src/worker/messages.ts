@@ -63,6 +63,10 @@ export type ToWorker =
   /** `pings`: participants may point. `tells_positions`: all hear where everybody is. */
   | { kind: 'present'; on: boolean; name: string; pings: boolean; tells_positions: boolean }
   | { kind: 'ping'; point: Vec3 }
+  /** Ends the visit until 'come_back'. */
+  | { kind: 'leave' }
+  | { kind: 'come_back' }
+  /** Ends the visit for good. */
   | { kind: 'stop' }
   | { kind: 'get_stats'; request: number }
   | { kind: 'get_snapshot'; request: number };
@@ -96,4 +100,7 @@ export type FromWorker =
   | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
   | { kind: 'stats'; request: number; stats: StatsReport }
   | { kind: 'snapshot'; request: number; snapshot: Snapshot | undefined }
+  /** Something failed in the worker, which goes on. */
+  | { kind: 'error'; message: string }
+  /** The worker cannot go on. */
   | { kind: 'broken'; message: string };

@@ -1,5 +1,6 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
+import { refreshes } from '../base/patience';
 import type { CameraSample, ClipPlane, Eye } from '../camera/eye';
 import type { Ray } from '../camera/ray';
 import { FramePipeline } from '../decode/frame_pipeline';
@@ -8,13 +9,15 @@ import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov, type Sides } from '../present/warp';
+import { widened_fov } from '../present/warp';
 import { eye_of, pose_message, vector_of, wire_vector } from '../session/camera_messages';
 import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
+import type { SessionState } from '../session/state';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
 import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import { aspect_of, frame_sizes } from './frame_sizes';
 import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
@@ -29,16 +32,19 @@ const scope = self as unknown as {
 const say = (message: FromWorker, transfer: Transferable[] = []): void =>
   scope.postMessage(message, transfer);
 
+const on_refresh = refreshes((draw) => scope.requestAnimationFrame(draw), browser_timers);
+
 let client: Client | undefined;
 
 // The page sees uncaught exceptions as the worker's error event, but no rejections.
 scope.onunhandledrejection = ({ reason }) => {
-  say({ kind: 'broken', message: String(reason) });
+  say({ kind: 'error', message: String(reason) });
 };
 
 scope.onmessage = ({ data }) => {
   if (data.kind !== 'start') {
     client?.handle(data);
+    if (data.kind === 'stop') client = undefined;
     return;
   }
   try {
@@ -59,6 +65,7 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
+  private phase_: SessionState['phase'] = 'connecting';
   private host_ = ''; // the name of who presents
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
@@ -68,10 +75,12 @@ class Client {
     this.view_ = start.view;
     this.quality_ = start.quality;
     this.rung_ = start.rung;
-    this.presenter_ = make_presenter(start.canvas, start.presenter);
+    this.presenter_ = make_presenter(start.canvas, start.presenter, () =>
+      this.session_.send({ case: 'requestIdr', value: {} }),
+    );
     const environment = {
       now_us: () => this.clock_.now_us(),
-      on_refresh: (draw: () => void) => void scope.requestAnimationFrame(draw),
+      on_refresh,
       overscan_changed: () => this.send_sizes(),
     };
     this.display_ = new Display(this.presenter_, environment, aspect_of(start.view));
@@ -115,7 +124,7 @@ class Client {
         break;
       case 'hidden':
         this.session_.set_paused(message.hidden);
-        if (message.hidden) this.pipeline_.discard_pending();
+        this.pipeline_.hidden = message.hidden;
         break;
       case 'retry':
         this.session_.retry();
@@ -136,8 +145,12 @@ class Client {
       case 'ping':
         this.session_.send({ case: 'ping', value: { place: wire_vector(message.point) } });
         break;
+      case 'leave':
       case 'stop':
         this.session_.stop();
+        break;
+      case 'come_back':
+        if (this.phase_ !== 'failed') this.session_.retry();
         break;
       case 'get_stats':
         this.post_stats(message.request);
@@ -183,8 +196,9 @@ class Client {
     return new FramePipeline(
       {
         now_us,
+        timers: browser_timers,
         make_decoder: (config, failures, events) => this.make_decoder(config, failures, events),
-        on_refresh: (draw) => scope.requestAnimationFrame(draw),
+        on_refresh,
         draw: (picture, { renderPose, fovYRad, widthPx, heightPx }) =>
           this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
       },
@@ -216,7 +230,10 @@ class Client {
         random: Math.random,
       },
       {
-        state: (state) => say({ kind: 'state', state }),
+        state: (state) => {
+          this.phase_ = state.phase;
+          say({ kind: 'state', state });
+        },
         welcome: (welcome) => say({ kind: 'welcome', welcome }),
         config: (config) => {
           this.metrics_.configured(config);
@@ -263,7 +280,7 @@ class Client {
         watch: start.watch,
         follow: start.watch !== '',
         device: start.device,
-        settings: settings(start.view, start.quality, this.display_.overscan),
+        settings: this.frame_sizes(),
       },
     );
   }
@@ -287,8 +304,12 @@ class Client {
   /** Frame sizes and fields of view change together, with the overscan. */
   private send_sizes(): void {
     this.session_.set_viewport(this.view_.width_px, this.view_.height_px);
-    this.session_.send_settings(settings(this.view_, this.quality_, this.display_.overscan));
+    this.session_.send_settings(this.frame_sizes());
     this.tell_presenter();
+  }
+
+  private frame_sizes(): SettingsInit {
+    return frame_sizes(this.view_, this.quality_, this.display_.overscan, this.presenter_.most_px);
   }
 
   private widened(eye: Eye): Eye {
@@ -308,7 +329,14 @@ class Client {
   ): Promise<MadeDecoder['decoder'] | undefined> {
     if (failures === 0) this.first_rung_ = this.rung_;
     const now_us = (): number => this.clock_.now_us();
-    const made = await make_decoder(config, this.first_rung_, failures, now_us, events);
+    const made = await make_decoder(
+      config,
+      this.first_rung_,
+      failures,
+      now_us,
+      browser_timers,
+      events,
+    );
     if (made && failures >= failures_per_rung && made.rung !== this.rung_)
       this.settle_on(made.rung);
     return made?.decoder;
@@ -326,7 +354,12 @@ class Client {
   }
 
   private post_snapshot(request: number): void {
-    const picture = this.shown_ && this.display_.read();
+    let picture;
+    try {
+      picture = this.shown_ && this.display_.read();
+    } catch (error) {
+      console.warn('the picture cannot be read', error);
+    }
     const snapshot = this.shown_ && picture && { header: this.shown_, ...picture };
     say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
@@ -336,23 +369,3 @@ const clip_message = (
   plane: ClipPlane | undefined,
 ): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
   plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
-
-const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
-
-/** Frame sizes: the chosen heights or those of the view, in the view's aspect, with overscan. */
-function settings(view: View, quality: Quality, overscan: Sides): SettingsInit {
-  const width_px = (height_px: number): number =>
-    frame_side(height_px * aspect_of(view) * overscan.x);
-  const moving_px = quality.height_px > 0 ? quality.height_px : view.height_px;
-  const still_px = quality.still_height_px > 0 ? quality.still_height_px : view.height_px;
-  return {
-    widthPx: width_px(moving_px),
-    heightPx: frame_side(moving_px * overscan.y),
-    stillWidthPx: width_px(still_px),
-    stillHeightPx: frame_side(still_px * overscan.y),
-    maxFps: quality.max_fps,
-  };
-}
-
-/** Limits a side to the range of the wire and makes it even, because 4:2:0 video has no odd sides. */
-const frame_side = (px: number): number => Math.min(8192, Math.max(16, Math.round(px / 2) * 2));
