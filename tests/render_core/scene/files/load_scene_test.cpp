@@ -190,7 +190,7 @@ TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
       input_error([&] { load_scene(path); }),
       path.string() +
           ": is not a scene of a known format (supported: .ply (3DGS or compressed), .ssog, .sog, "
-          ".spz, .glb, .gltf, .lcc2, .tree, .ksplat, .splat, a folder with lod-meta.json "
+          ".spz, .glb, .gltf, .lcc2, .lcc, .tree, .ksplat, .splat, a folder with lod-meta.json "
           "(streamed "
           "SOG), tileset.json (3D Tiles) or meta.json (SOG), a training output folder)");
   LoadOptions level;
@@ -207,7 +207,7 @@ TEST_F(LoadScene, UnknownFilesAreRefusedWithTheListOfFormats) {
 
 TEST_F(LoadScene, EachFormatIsToldByItsExtensionToo) {
   for (const char* name : {"a.ply", "a.splat", "a.ksplat", "a.spz", "a.sog", "a.ssog", "a.glb",
-                           "a.gltf", "a.lcc2", "a.tree"})
+                           "a.gltf", "a.lcc", "a.lcc2", "a.tree"})
     EXPECT_TRUE(is_scene_name(name)) << name;
   for (const char* name : {"a.json", "ply", "a.obj", ".ply"}) EXPECT_FALSE(is_scene_name(name));
   for (const char* name : {"lod-meta.json", "tileset.json", "meta.json"})
