@@ -10,7 +10,7 @@ usage: deploy/run.sh [SCENE...] [options] [catgs-server options]
 
 Installs what the build needs, builds the server and the browser client, and serves the scenes.
 Without a SCENE it makes a procedural city of 300,000 Gaussians and a garden, and serves these with tours.
-SCENE is a .ply, .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .lcc2 or .tree file, or a folder: SOG,
+SCENE is a .ply, .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .lcc, .lcc2 or .tree file, or a folder: SOG,
 streamed SOG, 3D Tiles, or a training output.
 
   --port N     listen on port N (default 8080)

@@ -24,10 +24,17 @@ constexpr std::string_view name_of(SplatModel model) {
   return splat_model_names[static_cast<std::size_t>(model)];
 }
 
-/// Nothing for other names. "mip" is what Brush writes for antialiased scenes.
+constexpr char to_lower(char c) {
+  return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
+/// In any case; nothing for other names. "mip" is what Brush writes for antialiased scenes.
 constexpr std::optional<SplatModel> splat_model_named(std::string_view name) {
-  if (name == "mip") return SplatModel::antialiased;
-  const auto* found = std::ranges::find(splat_model_names, name);
+  const auto is_named = [&](std::string_view known) {
+    return std::ranges::equal(name, known, {}, to_lower);
+  };
+  if (is_named("mip")) return SplatModel::antialiased;
+  const auto* found = std::ranges::find_if(splat_model_names, is_named);
   if (found == splat_model_names.end()) return std::nullopt;
   return static_cast<SplatModel>(found - splat_model_names.begin());
 }

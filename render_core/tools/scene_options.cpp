@@ -34,13 +34,13 @@ LoadOptions load_options(const SceneOptions& options, int threads, Progress& pro
 
 void add_scene_options(CLI::App& command, SceneOptions& options, const std::string& name) {
   command.add_option(name, options.path, "Scene file or folder")->required();
-  auto* lod =
-      command.add_option("--lod", options.lod,
-                         "Streamed SOG, 3D Tiles, LCC2: level of detail to load; 0 is the finest");
+  auto* lod = command.add_option(
+      "--lod", options.lod,
+      "Streamed SOG, 3D Tiles, LCC, LCC2: level of detail to load; 0 is the finest");
   command
-      .add_option(
-          "--budget", options.budget,
-          "Streamed SOG, 3D Tiles, LCC2: load the finest levels with at most so many Gaussians")
+      .add_option("--budget", options.budget,
+                  "Streamed SOG, 3D Tiles, LCC, LCC2: load the finest levels with at most so many "
+                  "Gaussians")
       ->excludes(lod);
   command.add_option("--up", options.up,
                      "Axis that points up, like +z, where no sidecar says so [estimated]");

@@ -38,7 +38,7 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
   const LoadContext context(*pool, options.progress);
   if (!location.has_levels() && (options.lod || options.gaussian_budget))
     throw InputError(location.given.string(), "", "has no levels of detail to choose from",
-                     "levels and budgets are for streamed SOG, 3D Tiles and LCC2");
+                     "levels and budgets are for streamed SOG, 3D Tiles, LCC and LCC2");
 
   Scene scene;
   scene.name = to_utf8(location.name);

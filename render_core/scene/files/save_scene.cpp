@@ -34,6 +34,16 @@ bool keeps_model(const std::filesystem::path& path, SplatModel model) {
   return model == SplatModel::antialiased ? format->keeps_antialiased : format->keeps_surfels;
 }
 
+std::vector<std::string> losses_of(const GaussianCloud& cloud, const std::filesystem::path& path) {
+  const SceneFormat* format = format_with(path.extension().string());
+  if (format == nullptr || !format->losses) return {};
+  try {
+    return format->losses(cloud);
+  } catch (const InputError& e) {
+    throw InputError(path.string(), "", e.what());
+  }
+}
+
 void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads) {
   assert(cloud.sizes_agree());
   const SceneFormat& format = format_to_write(path);

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "render_core/scene/gaussian_cloud.h"
 
@@ -11,6 +13,10 @@ void check_can_be_saved(const std::filesystem::path& path);
 
 /// Whether a file of this name can tell the model.
 bool keeps_model(const std::filesystem::path& path, SplatModel model);
+
+/// What a file of this name would not hold of the cloud, for people. Throws InputError as
+/// save_scene() does.
+std::vector<std::string> losses_of(const GaussianCloud& cloud, const std::filesystem::path& path);
 
 /// Writes the cloud in the format that the extension names. The file appears under its name only
 /// when it is complete. `threads`: 0 means one per processor. Throws InputError as

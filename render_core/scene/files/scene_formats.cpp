@@ -10,6 +10,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/ksplat.h"
+#include "render_core/scene/formats/lcc.h"
 #include "render_core/scene/formats/lcc2.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/formats/sog.h"
@@ -24,8 +25,8 @@ namespace {
 
 // The content of a file decides before its name does, but an .ssog is a zip archive as a .sog is.
 constexpr std::array formats = {
-    &ply_format,  &streamed_sog_format, &tiles_format, &sog_format,    &spz_format,
-    &gltf_format, &lcc2_format,         &tree_format,  &ksplat_format, &splat_format,
+    &ply_format,  &streamed_sog_format, &tiles_format, &sog_format,    &spz_format,   &gltf_format,
+    &lcc2_format, &lcc_format,          &tree_format,  &ksplat_format, &splat_format,
 };
 
 /// "a, b or c"

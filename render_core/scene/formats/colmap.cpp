@@ -22,7 +22,7 @@ constexpr std::size_t max_name_bytes = 4096;
 constexpr int max_side_px = 1 << 20;
 using Cameras = std::map<std::uint32_t, Camera>;
 
-constexpr std::size_t max_parameters = 12;
+constexpr std::size_t max_parameters = 16;
 
 /// COLMAP's camera models by its numbers and names.
 struct Model {
@@ -30,9 +30,9 @@ struct Model {
   std::string_view name;
   std::size_t focal_lengths;  // the first parameters: f or fx, fy; then come cx, cy
   std::size_t parameters;     // more than these: distortion
-  [[nodiscard]] bool pinhole() const { return parameters == focal_lengths + 2; }
+  [[nodiscard]] bool pinhole() const { return id < 2; }
 };
-constexpr std::array<Model, 11> models = {{{0, "SIMPLE_PINHOLE", 1, 3},
+constexpr std::array<Model, 17> models = {{{0, "SIMPLE_PINHOLE", 1, 3},
                                            {1, "PINHOLE", 2, 4},
                                            {2, "SIMPLE_RADIAL", 1, 4},
                                            {3, "RADIAL", 1, 5},
@@ -42,7 +42,13 @@ constexpr std::array<Model, 11> models = {{{0, "SIMPLE_PINHOLE", 1, 3},
                                            {7, "FOV", 2, 5},
                                            {8, "SIMPLE_RADIAL_FISHEYE", 1, 4},
                                            {9, "RADIAL_FISHEYE", 1, 5},
-                                           {10, "THIN_PRISM_FISHEYE", 2, 12}}};
+                                           {10, "THIN_PRISM_FISHEYE", 2, 12},
+                                           {11, "RAD_TAN_THIN_PRISM_FISHEYE", 2, 16},
+                                           {12, "SIMPLE_DIVISION", 1, 4},
+                                           {13, "DIVISION", 2, 5},
+                                           {14, "SIMPLE_FISHEYE", 1, 3},
+                                           {15, "FISHEYE", 2, 4},
+                                           {16, "EUCM", 2, 6}}};
 
 /// The model that is found by `key`. Throws InputError where it is unknown or refused.
 template <class Key>
@@ -51,7 +57,7 @@ const Model& model_of(const std::string& file, const std::string& where, const K
   const auto model = std::ranges::find(models, key, member);
   if (model == models.end())
     throw InputError(file, where, fmt::format("unknown camera model {}", key),
-                     "the models of COLMAP up to THIN_PRISM_FISHEYE are known");
+                     "the models of COLMAP up to EUCM are known; panoramas have no lens");
   if (distortion == Distortion::refused && !model->pinhole())
     throw InputError(file, where, fmt::format("model {} is not a pinhole camera", model->name),
                      "colmap image_undistorter makes pinhole pictures");
@@ -183,7 +189,7 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
   std::vector<Line> lines;
   std::string text;
   for (std::size_t number = 1; std::getline(stream, text); ++number) {
-    if (!text.empty() && text.back() == '\r') text.pop_back();
+    text.erase(text.find_last_not_of(" \t\r") + 1);
     if (!text.starts_with('#')) lines.push_back({number, text});
   }
   return lines;
@@ -217,13 +223,24 @@ Cameras read_text_cameras(const std::filesystem::path& path, Distortion distorti
   return cameras;
 }
 
+/// Whether the line has numbers in threes. An image has a name, and ten words.
+bool lists_points(std::string_view text) {
+  constexpr std::string_view blank = " \t";
+  if (text.find_first_not_of("0123456789+-.eE \t") != std::string_view::npos) return false;
+  std::size_t words = 0;
+  for (std::size_t at = 0; (at = text.find_first_not_of(blank, at)) != std::string_view::npos;
+       ++words)
+    at = std::min(text.find_first_of(blank, at), text.size());
+  return words % 3 == 0;
+}
+
 std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
                                            const Cameras& cameras) {
   const std::vector<Line> lines = read_lines(path);
   std::vector<ListedCamera> images;
-  // Every second line lists points, which may be none.
-  for (std::size_t i = 0; i < lines.size(); i += 2) {
-    if (lines[i].text.empty() && i + 1 >= lines.size()) break;
+  // A line of points, which may be none, is behind each image; further empty lines may be anywhere.
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i].text.empty()) continue;
     std::istringstream fields(lines[i].text);
     std::uint32_t id = 0, camera_id = 0;
     std::array<double, 7> pose{};
@@ -237,6 +254,8 @@ std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
     }
     images.push_back(
         make_image(path.string(), where_of(lines[i]), std::move(name), pose, cameras, camera_id));
+    while (i + 1 < lines.size() && lines[i + 1].text.empty()) ++i;
+    if (i + 1 < lines.size() && lists_points(lines[i + 1].text)) ++i;
   }
   return images;
 }

@@ -164,7 +164,7 @@ GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& heade
   const int degree = require_consistent(file, header, layout);
   GaussianCloud cloud;
   cloud.resize(layout.vertex->count, degree);
-  cloud.model = header.model.value_or(SplatModel::standard);
+  cloud.model = header.statements.model.value_or(SplatModel::standard);
 
   const auto rows_of = [&](const PlyElement& element, std::size_t begin, std::size_t end) {
     return read_rows(file, element.data_offset, element.row_bytes, {}, begin, end);

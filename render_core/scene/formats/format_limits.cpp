@@ -1,8 +1,12 @@
 #include "render_core/scene/formats/format_limits.h"
 
+#include <algorithm>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
@@ -31,6 +35,14 @@ int sh_degree_of_rest(std::size_t coefficients) {
   for (int degree = 0; degree <= 4; ++degree)
     if (coefficients + 1 == static_cast<std::size_t>((degree + 1) * (degree + 1))) return degree;
   return -1;
+}
+
+void add_note(std::vector<std::string>& notes, std::string_view note) {
+  constexpr std::size_t most_notes = 32, most_bytes = 320;
+  std::string text = printable(shortened(note, most_bytes));
+  if (note.size() > most_bytes) text += "…";
+  if (notes.size() < most_notes && std::ranges::find(notes, text) == notes.end())
+    notes.push_back(std::move(text));
 }
 
 std::vector<std::string> notes_of_degree(int degree) {

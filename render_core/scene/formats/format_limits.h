@@ -33,6 +33,10 @@ inline constexpr std::uint64_t max_compression = 256;
 /// -1 for any other number.
 int sh_degree_of_rest(std::size_t coefficients);
 
+/// Adds what people should know about a file, whose words may be in it. Long notes are cut, and
+/// repeated and further ones are left out.
+void add_note(std::vector<std::string>& notes, std::string_view note);
+
 /// For people: what is left out of harmonics up to `degree`.
 std::vector<std::string> notes_of_degree(int degree);
 

@@ -18,6 +18,7 @@
 #include "render_core/scene/directions.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/formats/model_statements.h"
 #include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/transform.h"
@@ -28,7 +29,10 @@ namespace {
 
 constexpr std::size_t max_parts = 4096, max_primitives = 65'536;
 constexpr std::string_view extension_name = "KHR_gaussian_splatting";
-constexpr std::string_view spz_extension_name = "KHR_gaussian_splatting_compression_spz_2";
+// The last is the first draft, which has no extension around it.
+constexpr std::array<std::string_view, 3> spz_extension_names = {
+    "KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz",
+    "KHR_spz_gaussian_splats_compression"};
 
 /// A primitive with Gaussians at a node.
 struct Part {
@@ -45,15 +49,9 @@ struct Contents {
   std::vector<Part> parts;
   std::size_t primitives = 0;  // at nodes, with Gaussians or without
   GltfSize size;
-  std::vector<std::string> notes;
+  ModelStatements statements;
 
-  /// Words of the file may be in it.
-  void note(std::string text) {
-    constexpr std::size_t most_notes = 16, most_bytes = 200;
-    if (text.size() > most_bytes) text = to_utf8(text.substr(0, most_bytes)) + "…";
-    if (notes.size() < most_notes && std::find(notes.begin(), notes.end(), text) == notes.end())
-      notes.push_back(std::move(text));
-  }
+  void note(std::string_view text) { add_note(statements.notes, text); }
 };
 
 /// Kinds of numbers that an attribute may have: any of these bits.
@@ -122,10 +120,21 @@ Part parse_spz_part(GltfDocument& document, const JsonField& spz, const JsonFiel
   const SceneSize size = read_spz_size(SliceSource(*part.spz.file, part.spz.offset, part.spz.size));
   part.count = size.gaussians;
   part.sh_degree = std::min(size.sh_degree, max_sh_degree);
-  for (std::string& note : notes_of_degree(size.sh_degree)) contents.note(std::move(note));
+  for (const std::string& note : notes_of_degree(size.sh_degree)) contents.note(note);
   if (const auto space = extension.find("colorSpace"))
     part.linear_colours = has_linear_colours(*space, contents);
   return part;
+}
+
+/// The extension for .spz, in its place or beside the extension for Gaussians.
+std::optional<JsonField> spz_of(const JsonField& primitive) {
+  const auto outer = primitive.find("extensions");
+  const auto gaussians = outer ? outer->find(extension_name) : std::nullopt;
+  const auto inner = gaussians ? gaussians->find("extensions") : std::nullopt;
+  for (const auto& extensions : {inner, outer})
+    for (const std::string_view name : spz_extension_names)
+      if (const auto spz = extensions ? extensions->find(name) : std::nullopt) return spz;
+  return std::nullopt;
 }
 
 Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonField& extension,
@@ -133,8 +142,10 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
   if (const auto mode = primitive.find("mode"); !mode || mode->count() != 0)
     primitive.fail("has Gaussians, but its 'mode' is not 0 (points)");
   check_words(extension, contents);
-  const auto further = extension.find("extensions");
-  if (const auto spz = further ? further->find(spz_extension_name) : std::nullopt)
+  contents.statements.read_members(extension.value());
+  if (const auto extras = primitive.find("extras"))
+    contents.statements.read_members(extras->value());
+  if (const auto spz = spz_of(primitive))
     return parse_spz_part(document, *spz, extension, contents);
   static_cast<void>(extension.at("kernel"));
   Part part;
@@ -142,7 +153,7 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
   const JsonField attributes = primitive.at("attributes");
   const auto read = [&](std::string_view name, std::size_t columns, unsigned kinds) {
     const GltfAccessor accessor = attribute(document, attributes, name, columns, kinds);
-    if (part.mean.buffer && accessor.count != part.mean.count)
+    if (part.mean.count > 0 && accessor.count != part.mean.count)
       attributes.at(name).fail(
           fmt::format("has {} rows, and POSITION {}", accessor.count, part.mean.count));
     return accessor;
@@ -150,14 +161,15 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
   // Positions may have all types of KHR_mesh_quantization.
   part.mean = read("POSITION", 3, floats | signed_fractions | fractions | counts | signed_counts);
   part.rotation = read(attribute_name("ROTATION"), 4, floats | signed_fractions);
-  part.scale = read(attribute_name("SCALE"), 3, floats | counts | fractions);
+  part.scale = read(attribute_name("SCALE"), 3, floats | counts | fractions | signed_fractions);
   part.opacity = read(attribute_name("OPACITY"), 1, floats | fractions);
-  part.sh.push_back(read(sh_name(0, 0), 3, floats));
+  constexpr unsigned harmonics = floats | fractions | signed_fractions;
+  part.sh.push_back(read(sh_name(0, 0), 3, harmonics));
   for (int degree = 1; degree <= max_sh_degree; ++degree) {
     if (!attributes.find(sh_name(degree, 0))) continue;
     if (part.sh.size() != static_cast<std::size_t>(degree * degree))
       attributes.fail(fmt::format("has harmonics of degree {} and not of all below", degree));
-    for (int k = 0; k <= 2 * degree; ++k) part.sh.push_back(read(sh_name(degree, k), 3, floats));
+    for (int k = 0; k <= 2 * degree; ++k) part.sh.push_back(read(sh_name(degree, k), 3, harmonics));
   }
   part.count = part.mean.count;
   part.sh_degree = sh_degree_of_rest(part.sh.size() - 1);
@@ -193,7 +205,8 @@ void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& ma
     if (++contents.primitives > max_primitives)
       primitive.fail(fmt::format("is one of more than {} at nodes", max_primitives));
     const auto extensions = primitive.find("extensions");
-    const auto extension = extensions ? extensions->find(extension_name) : std::nullopt;
+    auto extension = extensions ? extensions->find(extension_name) : std::nullopt;
+    if (!extension) extension = spz_of(primitive);
     if (!extension) {
       contents.note("it has meshes beside its Gaussians, which are not shown");
       continue;
@@ -211,14 +224,16 @@ void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& ma
 
 void check_extensions(const JsonField& root) {
   // Gaussians have no material.
-  constexpr std::array<std::string_view, 4> known = {
-      extension_name, spz_extension_name, "KHR_mesh_quantization", "KHR_materials_unlit"};
+  constexpr std::array<std::string_view, 3> known = {extension_name, "KHR_mesh_quantization",
+                                                     "KHR_materials_unlit"};
   const auto required = root.find("extensionsRequired");
   if (!required) return;
-  for (std::size_t i = 0; i < required->size(); ++i)
-    if (std::find(known.begin(), known.end(), (*required)[i].text()) == known.end())
-      (*required)[i].fail(fmt::format("'{}' is not supported", (*required)[i].text()),
+  for (std::size_t i = 0; i < required->size(); ++i) {
+    const std::string name = (*required)[i].text();
+    if (std::ranges::count(known, name) + std::ranges::count(spz_extension_names, name) == 0)
+      (*required)[i].fail(fmt::format("'{}' is not supported", name),
                           "export it without this extension");
+  }
 }
 
 Contents contents_of(const ByteSource& file, GltfDocument& document, const AffineMap& world) {
@@ -338,8 +353,10 @@ void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
 }  // namespace
 
 AffineMap affine_map(const JsonField& matrix) {
+  constexpr double rounding = 1e-9, float_rounding = 1e-6;
   const auto m = matrix.doubles<16>();  // by columns
-  if (m[3] != 0.0 || m[7] != 0.0 || m[11] != 0.0 || m[15] != 1.0)
+  const double last = std::max({std::abs(m[3]), std::abs(m[7]), std::abs(m[11])});
+  if (last > rounding || std::abs(m[15] - 1.0) > float_rounding)
     matrix.fail("has a last row other than 0, 0, 0, 1");
   return {{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[12], m[13], m[14]}};
 }
@@ -347,7 +364,7 @@ AffineMap affine_map(const JsonField& matrix) {
 GltfSize read_gltf_size(const ByteSource& file, const FileSet& beside) {
   GltfDocument document(file, beside);
   Contents contents = contents_of(file, document, left_up_front);
-  contents.size.notes = std::move(contents.notes);
+  contents.size.notes = std::move(contents.statements.notes);
   return contents.size;
 }
 
@@ -359,7 +376,8 @@ GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadCont
                    const AffineMap& world) {
   GltfDocument document(file, beside);
   const Contents contents = contents_of(file, document, world);
-  GltfFile result{{}, contents.notes};
+  GltfFile result{{}, contents.statements.notes};
+  result.cloud.model = contents.statements.model.value_or(SplatModel::standard);
   result.cloud.resize(contents.size.count, contents.size.sh_degree);
   const auto total = static_cast<double>(contents.size.count);
   std::size_t first = 0;

@@ -26,8 +26,8 @@ struct SceneFormat;
 // directions. Opaque surfaces then look as they should, and blended edges a little darker.
 //
 // A primitive may hold an .spz (KHR_gaussian_splatting_compression_spz_2, a draft that Cesium's
-// tiles use). Its numbers are those of glTF as they are stored, as CesiumJS reads them, whatever
-// axes the .spz names.
+// tiles use, and two earlier names of it). Its numbers are those of glTF as they are stored, as
+// CesiumJS reads them, whatever axes the .spz names.
 
 struct GltfSize {
   std::uint64_t count = 0;
@@ -54,7 +54,8 @@ GltfFile read_gltf(const ByteSource& file, const FileSet& beside, const LoadCont
 /// The names of the files beside it that a .gltf has its data in. Throws InputError.
 std::vector<std::string> gltf_buffer_files(const ByteSource& file);
 
-/// The map of a 4x4 matrix by columns. Throws InputError when its last row is not 0, 0, 0, 1.
+/// The map of a 4x4 matrix by columns. Throws InputError when its last row is not 0, 0, 0, 1 but
+/// for rounding.
 AffineMap affine_map(const JsonField& matrix);
 
 /// Writes a .glb with floats: what read_gltf() reads from it is the same, bit for bit. Throws

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstring>
 #include <limits>
 #include <string_view>
 #include <utility>
@@ -63,6 +64,13 @@ GltfComponent component_of(const JsonField& field) {
         GltfComponent::unsigned_short, GltfComponent::float32})
     if (field.count() == static_cast<std::uint64_t>(known)) return known;
   field.fail("is not a component type of an attribute");
+}
+
+std::size_t bytes_of_index(const JsonField& component_type) {
+  constexpr std::array<std::uint64_t, 3> types = {5121, 5123, 5125};  // unsigned
+  const auto found = std::ranges::find(types, component_type.count());
+  if (found == types.end()) component_type.fail("is not a component type of an index");
+  return std::size_t{1} << (found - types.begin());
 }
 
 std::size_t columns_of(const JsonField& field) {
@@ -132,9 +140,21 @@ void convert(const std::byte* from, const GltfAccessor& rows, std::vector<float>
 std::vector<float> GltfAccessor::read(std::size_t begin, std::size_t end) const {
   std::vector<float> numbers((end - begin) * columns);
   if (numbers.empty()) return numbers;
-  std::vector<std::byte> bytes((end - begin - 1) * stride + columns * component_bytes(component));
-  buffer->read(offset + begin * stride, bytes);
-  with_type(component, [&]<class T>(T) { convert<T>(bytes.data(), *this, numbers); });
+  if (buffer) {
+    std::vector<std::byte> bytes((end - begin - 1) * stride + columns * component_bytes(component));
+    buffer->read(offset + begin * stride, bytes);
+    with_type(component, [&]<class T>(T) { convert<T>(bytes.data(), *this, numbers); });
+  }
+  if (!sparse) return numbers;
+  const auto& rows = sparse->rows;
+  const auto first = std::ranges::lower_bound(rows, begin),
+             last = std::ranges::lower_bound(rows, end);
+  const auto place = static_cast<std::size_t>(first - rows.begin());
+  const std::vector<float> values =
+      sparse->values.read(place, static_cast<std::size_t>(last - rows.begin()));
+  for (std::size_t i = 0; i * columns < values.size(); ++i)
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * columns), columns,
+                numbers.begin() + static_cast<std::ptrdiff_t>((rows[place + i] - begin) * columns));
   return numbers;
 }
 
@@ -250,7 +270,6 @@ GltfBytes GltfDocument::view(const JsonField& index) {
 
 GltfAccessor GltfDocument::accessor(const JsonField& index) {
   const JsonField field = at("accessors", index);
-  if (field.find("sparse")) field.at("sparse").fail("is not supported", "store all values");
   GltfAccessor accessor;
   accessor.count = field.at("count").count();
   accessor.columns = columns_of(field.at("type"));
@@ -262,6 +281,13 @@ GltfAccessor GltfDocument::accessor(const JsonField& index) {
   if (accessor.count == 0 || accessor.count > max_gaussians)
     field.at("count").fail(fmt::format("is not in 1…{}", max_gaussians));
 
+  if (field.find("bufferView")) locate(field, accessor);
+  if (const auto sparse = field.find("sparse"))
+    accessor.sparse = std::make_shared<const GltfSparseRows>(sparse_rows(*sparse, accessor));
+  return accessor;
+}
+
+void GltfDocument::locate(const JsonField& field, GltfAccessor& accessor) {
   const GltfBytes bytes = view(field.at("bufferView"));
   const JsonField layout = at("bufferViews", field.at("bufferView"));
   const std::uint64_t row_bytes = accessor.columns * component_bytes(accessor.component);
@@ -273,7 +299,28 @@ GltfAccessor GltfDocument::accessor(const JsonField& index) {
   accessor.buffer = bytes.file;
   accessor.offset = bytes.offset + first;
   accessor.stride = stride;
-  return accessor;
+}
+
+GltfSparseRows GltfDocument::sparse_rows(const JsonField& field, const GltfAccessor& accessor) {
+  const std::uint64_t count = field.at("count").count();
+  if (count == 0 || count > accessor.count)
+    field.at("count").fail(fmt::format("is not in 1…{}", accessor.count));
+  const JsonField indices = field.at("indices"), kind = indices.at("componentType");
+  const std::size_t bytes_each = bytes_of_index(kind);
+  const GltfBytes held = view(indices.at("bufferView"));
+  const std::uint64_t first = count_or(indices, "byteOffset", 0);
+  require_inside(indices, first, count * bytes_each, held.size);
+  std::vector<std::byte> bytes(count * bytes_each);
+  held.file->read(held.offset + first, bytes);
+  GltfSparseRows sparse{std::vector<std::uint32_t>(count), accessor};
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(&sparse.rows[i], &bytes[i * bytes_each], bytes_each);
+    if (sparse.rows[i] >= accessor.count || (i > 0 && sparse.rows[i] <= sparse.rows[i - 1]))
+      indices.fail("do not ascend, or name a row that is not there");
+  }
+  sparse.values.count = count;
+  locate(field.at("values"), sparse.values);
+  return sparse;
 }
 
 std::uint64_t GltfDocument::bytes() const {

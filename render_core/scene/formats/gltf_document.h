@@ -24,19 +24,28 @@ enum class GltfComponent {
   float32 = 5126,
 };
 
+struct GltfSparseRows;
+
 /// A table of numbers in a buffer, checked to lie inside it.
 struct GltfAccessor {
-  const ByteSource* buffer = nullptr;
-  std::uint64_t offset = 0;  // of the first row, in `buffer`
-  std::size_t stride = 0;    // bytes from a row to the next
-  std::uint64_t count = 0;   // rows
+  const ByteSource* buffer = nullptr;  // null: the numbers are 0
+  std::uint64_t offset = 0;            // of the first row, in `buffer`
+  std::size_t stride = 0;              // bytes from a row to the next
+  std::uint64_t count = 0;             // rows
   std::size_t columns = 0;
   GltfComponent component = GltfComponent::float32;
   bool normalized = false;  // integers stand for 0…1 or -1…1
+  std::shared_ptr<const GltfSparseRows> sparse{};
 
   /// Rows [begin, end), row by row, as the numbers that they stand for. Throws InputError when the
   /// buffer's file became shorter.
   [[nodiscard]] std::vector<float> read(std::size_t begin, std::size_t end) const;
+};
+
+/// Rows of an accessor that have other values than its buffer.
+struct GltfSparseRows {
+  std::vector<std::uint32_t> rows;  // ascending
+  GltfAccessor values;              // one for each
 };
 
 /// Some bytes of a buffer, checked to lie inside it.
@@ -73,6 +82,9 @@ class GltfDocument {
  private:
   [[nodiscard]] nlohmann::json read_glb(const ByteSource& file);
   [[nodiscard]] GltfBytes buffer(const JsonField& index);
+  /// Finds the rows in the buffer view that `field` names.
+  void locate(const JsonField& field, GltfAccessor& accessor);
+  [[nodiscard]] GltfSparseRows sparse_rows(const JsonField& field, const GltfAccessor& accessor);
   [[nodiscard]] const ByteSource& open(const JsonField& uri);
 
   std::string name_;

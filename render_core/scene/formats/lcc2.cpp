@@ -13,6 +13,7 @@
 #include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/formats/axes.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/model_statements.h"
 #include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/spz.h"
@@ -46,6 +47,7 @@ struct Index {
   std::optional<std::size_t> environment;  // its file
   DetailTree tree;
   std::vector<Piece> pieces;  // by node
+  ModelStatements statements;
 };
 
 std::size_t file_at(const JsonField& index, const Index& scene) {
@@ -110,6 +112,7 @@ Index parse_scene(const ByteSource& file) {
   const JsonField meta(file.name(), document);
   Index scene;
   scene.name = file.name();
+  scene.statements.read_members(document);
   if (const auto version = meta.find("version"); version && !version->text().starts_with("0.0."))
     version->fail("is not supported", "0.0.3 is");
   if (const auto type = meta.find("splatType")) {
@@ -134,6 +137,7 @@ struct Part {
   int file_degree = 0;
   std::vector<SogRange> ranges;  // in order, and in the part one after the other
   std::size_t count = 0;
+  std::vector<std::string> notes{};
 
   void take(std::size_t begin, std::size_t taken) {
     ranges.push_back({begin, taken, count});
@@ -157,6 +161,7 @@ Part open_part(const FileSet& files, const Index& scene, std::size_t file) {
     if (meta.hides_sh_degree()) meta = read_sog_meta(ZipFiles(*source), meta_name);
     part.held = meta.count;
     part.file_degree = meta.sh_degree;
+    part.notes = std::move(meta.notes);
   }
   return part;
 }
@@ -253,13 +258,18 @@ OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::st
   scene.notes.emplace_back(origin);
   int file_degree = 0;
   for (const Part& part : *parts) file_degree = std::max(file_degree, part.file_degree);
-  for (std::string& note : notes_of_degree(file_degree)) scene.notes.push_back(std::move(note));
+  for (const std::string& note : notes_of_degree(file_degree)) add_note(scene.notes, note);
+  for (const std::string& note : lcc2.statements.notes) add_note(scene.notes, note);
+  for (const Part& part : *parts)
+    for (const std::string& note : part.notes) add_note(scene.notes, note);
   scene.sh_degree = std::min(file_degree, max_sh_degree);
   require_plausible_count(*file, "root", scene.count, sog_least_bytes, files.bytes(), most);
   scene.parts = parts->size();
-  scene.read = [folder, parts, degree = scene.sh_degree](std::size_t part,
-                                                         const LoadContext& context) {
-    return read_part(*folder, (*parts)[part], degree, context);
+  scene.read = [folder, parts, degree = scene.sh_degree, model = lcc2.statements.model](
+                   std::size_t part, const LoadContext& context) {
+    GaussianCloud cloud = read_part(*folder, (*parts)[part], degree, context);
+    cloud.model = model.value_or(cloud.model);
+    return cloud;
   };
   return scene;
 }

@@ -47,6 +47,7 @@ struct Field {
 struct Layout {
   int sh_degree = 0;
   std::vector<Field> fields;
+  float colour_unit = 0.0f;  // of red, green, blue in place of f_dc; 0: there are f_dc
 };
 
 std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
@@ -62,6 +63,24 @@ std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
 
 bool is_of_surfels(const PlyElement& vertex) { return vertex.find("scale_2") == nullptr; }
 
+/// The names of red, green and blue. nerfstudio writes the first for scenes without harmonics.
+std::array<std::string, 3> colour_names(const PlyElement& vertex) {
+  const std::array<std::array<std::string, 3>, 3> known = {
+      {{"red", "green", "blue"},
+       {"r", "g", "b"},
+       {"diffuse_red", "diffuse_green", "diffuse_blue"}}};
+  if (!vertex.find("f_dc_0"))
+    for (const auto& names : known)
+      if (vertex.find(names[0])) return names;
+  return {"f_dc_0", "f_dc_1", "f_dc_2"};
+}
+
+/// The value of a colour's property that stands for 1.
+float full_colour(PlyType type) {
+  if (type == PlyType::f32 || type == PlyType::f64) return 1.0f;
+  return byte_size(type) == 2 ? 65535.0f : 255.0f;
+}
+
 Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
   const std::size_t rest = vertex.rest_count();
   const int file_degree = rest % 3 == 0 ? sh_degree_of_rest(rest / 3) : -1;
@@ -75,9 +94,12 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
     layout.fields.push_back({destination, require_property(file, vertex, name)});
   };
   const auto at = [](std::size_t offset_bytes) { return offset_bytes / sizeof(float); };
+  const std::array<std::string, 3> colours = colour_names(vertex);
+  if (!colours[0].starts_with("f_"))
+    layout.colour_unit = 1.0f / full_colour(vertex.find(colours[0])->type);
   for (std::size_t k = 0; k < 3; ++k) {
     add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
-    add(at(offsetof(Row, dc)) + k, fmt::format("f_dc_{}", k));
+    add(at(offsetof(Row, dc)) + k, colours[k]);
     if (k < 2 || !is_of_surfels(vertex))
       add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
   }
@@ -94,10 +116,10 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
 
 SplatModel model_of(const PlyHeader& header, const PlyElement& vertex) {
   if (is_of_surfels(vertex)) return SplatModel::surfels;
-  return header.model.value_or(SplatModel::standard);
+  return header.statements.model.value_or(SplatModel::standard);
 }
 
-void store(const Row& row, GaussianCloud& cloud, std::size_t i) {
+void store(const Row& row, const Layout& layout, GaussianCloud& cloud, std::size_t i) {
   cloud.mean[i] = {row.mean[0], row.mean[1], row.mean[2]};
   cloud.rotation[i] =
       unit(glm::quat(row.rotation[0], row.rotation[1], row.rotation[2], row.rotation[3]));
@@ -106,6 +128,8 @@ void store(const Row& row, GaussianCloud& cloud, std::size_t i) {
   const std::size_t rest = cloud.sh_count() - 1;
   glm::vec3* sh = cloud.sh.data() + i * cloud.sh_count();
   sh[0] = {row.dc[0], row.dc[1], row.dc[2]};
+  if (layout.colour_unit > 0.0f)
+    for (int k = 0; k < 3; ++k) sh[0][k] = sh_from_colour(layout.colour_unit * sh[0][k]);
   for (std::size_t k = 0; k < rest; ++k)
     sh[1 + k] = {row.rest[k], row.rest[rest + k], row.rest[2 * rest + k]};
 }
@@ -168,7 +192,7 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
                        std::array<float, row_fields> fields{};
                        for (std::size_t i = begin; i < end; ++i) {
                          decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
-                         store(std::bit_cast<Row>(fields), cloud, i);
+                         store(std::bit_cast<Row>(fields), layout, cloud, i);
                        }
                      });
 }
@@ -219,17 +243,18 @@ void read_ascii(const ByteSource& file, const PlyHeader& header, const PlyElemen
   AsciiNumbers numbers(file, header.bytes);
   for (const PlyElement& before : header.elements) {
     if (&before == &vertex) break;
-    if (before.has_list)
-      throw InputError(file.name(), "element " + before.name,
-                       "has a list property and stands before element vertex");
-    for (std::uint64_t n = before.count * before.properties.size(); n > 0; --n) numbers.next();
+    if (before.properties.empty()) continue;
+    for (std::uint64_t row = 0; row < before.count; ++row)
+      for (const PlyProperty& property : before.properties)
+        for (double left = property.is_list ? numbers.next() : 1.0; left > 0.0; --left)
+          numbers.next();
   }
   std::vector<float> values(vertex.properties.size());
   std::array<float, row_fields> fields{};
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (float& value : values) value = numbers.next();
     for (const Field& f : layout.fields) fields[f.destination] = values[f.property];
-    store(std::bit_cast<Row>(fields), cloud, i);
+    store(std::bit_cast<Row>(fields), layout, cloud, i);
     if (i % 65536 == 0) context.report(static_cast<double>(i) / static_cast<double>(cloud.size()));
   }
 }
@@ -335,17 +360,20 @@ SceneSize size_of_ply(const SceneFiles& files) {
   return {vertex->count, std::max(0, sh_degree_of_rest(sh->rest_count() / 3))};
 }
 
-std::vector<std::string> notes_of(const PlyElement& vertex) {
-  return notes_of_degree(sh_degree_of_rest(vertex.rest_count() / 3));
+std::vector<std::string> notes_of(const PlyHeader& header) {
+  std::vector<std::string> notes =
+      notes_of_degree(sh_degree_of_rest(header.find("vertex")->rest_count() / 3));
+  for (const std::string& note : header.statements.notes) add_note(notes, note);
+  return notes;
 }
 
 DecodedScene read_any_ply(const SceneFiles& files, const LoadContext& context) {
   const FileSource file(files.path);
   const PlyHeader header = read_ply_header(file);
   if (is_compressed_ply(header))
-    return {"compressed ply", read_compressed_ply(file, header, context)};
+    return {"compressed ply", read_compressed_ply(file, header, context), header.statements.notes};
   GaussianCloud cloud = read_ply(file, header, context);
-  return {"3DGS ply", std::move(cloud), notes_of(*header.find("vertex"))};
+  return {"3DGS ply", std::move(cloud), notes_of(header)};
 }
 
 std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t part_rows,
@@ -359,7 +387,7 @@ std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t 
   const auto read = [=](const FileRows& rows, const LoadContext& reading) {
     return read_ply_rows(*file, *header, rows, reading);
   };
-  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*vertex));
+  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*header));
 }
 
 }  // namespace

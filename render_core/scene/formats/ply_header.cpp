@@ -14,7 +14,7 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_header_bytes = 64 * 1024;
+constexpr std::size_t max_header_bytes = std::size_t{1} << 20;
 
 struct TypeName {
   std::string_view name;
@@ -41,6 +41,67 @@ std::vector<std::string_view> split(std::string_view line) {
   return words;
 }
 
+/// Finds the end of rows that have lists, through a window of the file.
+class ListWalk {
+ public:
+  ListWalk(const ByteSource& file, std::uint64_t begin, bool big_endian)
+      : file_(file), at_(begin), big_endian_(big_endian) {}
+
+  std::uint64_t end_of_rows(const PlyElement& element) {
+    for (std::uint64_t row = 0; row < element.count; ++row)
+      for (const PlyProperty& property : element.properties)
+        if (property.is_list)
+          skip(element, length_of_list(element, property.length_type), byte_size(property.type));
+        else
+          skip(element, 1, byte_size(property.type));
+    return at_;
+  }
+
+ private:
+  [[noreturn]] void fail(const PlyElement& element, std::string_view what) const {
+    throw InputError(file_.name(), fmt::format("byte {}", at_),
+                     fmt::format("element {}: {}", element.name, what),
+                     "the file is cut off or its header is wrong");
+  }
+
+  void skip(const PlyElement& element, std::uint64_t count, std::size_t bytes) {
+    if (count > (file_.size() - at_) / bytes) fail(element, "the file ends inside its rows");
+    at_ += count * bytes;
+  }
+
+  std::uint64_t length_of_list(const PlyElement& element, PlyType type) {
+    const std::size_t bytes = byte_size(type);
+    if (at_ < window_begin_ || at_ + bytes > window_begin_ + window_.size()) {
+      window_begin_ = at_;
+      window_.resize(std::min<std::uint64_t>(file_.size() - at_, 64 * 1024));
+      file_.read(at_, window_);
+    }
+    const std::uint64_t begin = at_ - window_begin_;
+    skip(element, 1, bytes);
+    std::uint64_t length = 0;
+    for (std::size_t i = 0; i < bytes; ++i)
+      length = length << 8 |
+               std::to_integer<std::uint64_t>(window_[begin + (big_endian_ ? i : bytes - 1 - i)]);
+    const bool is_signed = type == PlyType::i8 || type == PlyType::i16 || type == PlyType::i32;
+    if (is_signed && length >> (8 * bytes - 1) != 0) fail(element, "a list has a negative length");
+    return length;
+  }
+
+  const ByteSource& file_;
+  std::uint64_t at_, window_begin_ = 0;
+  std::vector<std::byte> window_;
+  const bool big_endian_;
+};
+
+/// The name that a property had before CloudCompare wrote it. It reads what it does not know as
+/// scalar fields, and saves those behind a prefix; earlier versions had another one on reading.
+std::string_view without_prefix(std::string_view name) {
+  for (const std::string_view prefix : {"scalar_", "scal_"})
+    if (std::ranges::equal(name.substr(0, prefix.size()), prefix, {}, to_lower))
+      name.remove_prefix(prefix.size());
+  return name;
+}
+
 class HeaderParser {
  public:
   HeaderParser(const ByteSource& file, std::string_view text) : file_(file), text_(text) {}
@@ -48,11 +109,14 @@ class HeaderParser {
   PlyHeader parse() {
     bool format_known = false;
     for (;;) {
-      const auto words = split(next_line());
+      const std::string_view line = next_line();
+      const auto words = split(line);
       if (line_number_ == 1) {
         if (words.size() != 1 || words[0] != "ply") fail("a PLY file begins with the line 'ply'");
-      } else if (words.empty() || words[0] == "comment" || words[0] == "obj_info") {
-        read_comment(words);
+      } else if (words.empty()) {
+        continue;
+      } else if (words[0] == "comment" || words[0] == "obj_info") {
+        header_.statements.read(line.substr(line.find(words[0]) + words[0].size()));
       } else if (words[0] == "format") {
         parse_format(words);
         format_known = true;
@@ -77,25 +141,20 @@ class HeaderParser {
     throw InputError(file_.name(), fmt::format("header line {}", line_number_), what);
   }
 
+  /// The first line tells whether the lines end in CR alone.
   std::string_view next_line() {
-    ++line_number_;
-    const std::size_t end = text_.find('\n', at_);
+    if (++line_number_ == 1) {
+      const std::size_t end = text_.find_first_of("\r\n");
+      if (end != std::string_view::npos && text_[end] == '\r' && text_.substr(end, 2) != "\r\n")
+        line_end_ = '\r';
+    }
+    const std::size_t end = text_.find(line_end_, at_);
     if (end == std::string_view::npos)
       fail(text_.size() < max_header_bytes ? "the file ends inside the header"
-                                           : "no 'end_header' within the first 64 KiB");
+                                           : "no 'end_header' within the first MiB");
     const auto line = text_.substr(at_, end - at_);
     at_ = end + 1;
     return line;
-  }
-
-  /// Comments of other programs and unknown values say nothing.
-  void read_comment(const std::vector<std::string_view>& words) {
-    if (words.size() != 3) return;
-    if (words[1] == "SplatRenderMode:") {
-      if (const auto model = splat_model_named(words[2])) header_.model = model;
-    } else if (words[1] == "antialiased" && (words[2] == "0" || words[2] == "1")) {
-      header_.model = words[2] == "1" ? SplatModel::antialiased : SplatModel::standard;
-    }
   }
 
   void parse_format(const std::vector<std::string_view>& words) {
@@ -134,7 +193,8 @@ class HeaderParser {
     PlyElement& element = header_.elements.back();
     PlyProperty property;
     if (words.size() == 5 && words[1] == "list") {
-      type_of(words[2]);
+      property.length_type = type_of(words[2]);
+      if (property.length_type >= PlyType::f32) fail("the length of a list is no whole number");
       property.is_list = element.has_list = true;
     } else if (words.size() != 3) {
       fail("expected 'property <type> <name>'");
@@ -142,17 +202,27 @@ class HeaderParser {
     property.type = type_of(words[words.size() - 2]);
     property.name = words.back();
     property.offset = element.row_bytes;
-    if (element.find(property.name)) fail(fmt::format("second property '{}'", property.name));
+    if (std::ranges::find(element.properties, property.name, &PlyProperty::name) !=
+        element.properties.end())
+      fail(fmt::format("second property '{}'", property.name));
     element.row_bytes += byte_size(property.type);
     element.properties.push_back(std::move(property));
   }
 
-  /// Elements behind one with a list cannot be located; none of the formats has any.
+  /// Rows of lists behind `vertex` are not walked: scenes have nothing there.
   void locate_elements() {
+    if (header_.encoding == PlyEncoding::ascii) return;
+    const bool big_endian = header_.encoding == PlyEncoding::binary_big_endian;
     std::uint64_t offset = header_.bytes;
+    bool vertex_located = false;
     for (PlyElement& element : header_.elements) {
       element.data_offset = offset;
-      if (header_.encoding == PlyEncoding::ascii || element.has_list) return;
+      vertex_located |= element.name == "vertex";
+      if (element.has_list) {
+        if (vertex_located || !header_.find("vertex")) return;
+        offset = ListWalk(file_, offset, big_endian).end_of_rows(element);
+        continue;
+      }
       if (element.row_bytes > 0 && element.count > (file_.size() - offset) / element.row_bytes)
         return;  // cut off here: the reader of this element or a later one reports it
       offset += element.count * element.row_bytes;
@@ -163,6 +233,7 @@ class HeaderParser {
   std::string_view text_;
   std::size_t at_ = 0;
   int line_number_ = 0;
+  char line_end_ = '\n';
   PlyHeader header_;
 };
 
@@ -187,14 +258,21 @@ std::size_t byte_size(PlyType type) {
 }
 
 const PlyProperty* PlyElement::find(std::string_view property) const {
-  const auto found = std::find_if(properties.begin(), properties.end(),
-                                  [&](const PlyProperty& p) { return p.name == property; });
+  auto found = std::ranges::find(properties, property, &PlyProperty::name);
+  if (found == properties.end())
+    found = std::ranges::find_if(properties, [&](const PlyProperty& p) {
+      return std::ranges::equal(without_prefix(p.name), property, {}, to_lower, to_lower);
+    });
   return found == properties.end() ? nullptr : &*found;
 }
 
 std::size_t PlyElement::rest_count() const {
-  const auto is_rest = [](const PlyProperty& p) { return p.name.starts_with("f_rest_"); };
-  return static_cast<std::size_t>(std::count_if(properties.begin(), properties.end(), is_rest));
+  constexpr std::string_view prefix = "f_rest_";
+  const auto is_rest = [&](const PlyProperty& p) {
+    return std::ranges::equal(without_prefix(p.name).substr(0, prefix.size()), prefix, {},
+                              to_lower);
+  };
+  return static_cast<std::size_t>(std::ranges::count_if(properties, is_rest));
 }
 
 const PlyElement* PlyHeader::find(std::string_view element) const {
@@ -204,8 +282,14 @@ const PlyElement* PlyHeader::find(std::string_view element) const {
 }
 
 PlyHeader read_ply_header(const ByteSource& file) {
-  std::string text(std::min<std::uint64_t>(file.size(), max_header_bytes), '\0');
-  file.read(0, std::as_writable_bytes(std::span(text)));
+  std::string text;
+  for (std::size_t most : {max_header_bytes / 16, max_header_bytes}) {  // few need the whole
+    text.resize(std::min<std::uint64_t>(file.size(), most));
+    file.read(0, std::as_writable_bytes(std::span(text)));
+    const std::size_t end = std::min(text.find("\nend_header"), text.find("\rend_header"));
+    constexpr std::size_t last_line = 64;  // with spaces behind
+    if (end < text.size() && text.size() - end >= last_line) break;
+  }
   return HeaderParser(file, text).parse();
 }
 

@@ -2,14 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "render_core/scene/formats/byte_source.h"
 #include "render_core/scene/formats/format_limits.h"
-#include "render_core/scene/splat_model.h"
+#include "render_core/scene/formats/model_statements.h"
 
 namespace catgs {
 
@@ -21,8 +20,9 @@ std::size_t byte_size(PlyType type);
 struct PlyProperty {
   std::string name;
   PlyType type = PlyType::f32;
-  std::size_t offset = 0;  // bytes from the start of a row
-  bool is_list = false;    // rows of an element with a list have no fixed size
+  std::size_t offset = 0;             // bytes from the start of a row
+  bool is_list = false;               // rows of an element with a list have no fixed size
+  PlyType length_type = PlyType::u8;  // of a list
 };
 
 struct PlyElement {
@@ -33,6 +33,7 @@ struct PlyElement {
   std::uint64_t data_offset = 0;  // binary only: byte in the file where the rows begin
   bool has_list = false;
 
+  /// By its name, in any case and behind a prefix of CloudCompare's ("scalar_", "scal_").
   [[nodiscard]] const PlyProperty* find(std::string_view property) const;
   /// Harmonics above degree 0, all channels: properties called "f_rest_…".
   [[nodiscard]] std::size_t rest_count() const;
@@ -41,14 +42,14 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::binary_little_endian;
   std::vector<PlyElement> elements;
-  std::uint64_t bytes = 0;  // the data begins here
-  /// Comments tell it: "SplatRenderMode: default|mip|2dgs" (Brush), "antialiased 0|1" (Postshot).
-  std::optional<SplatModel> model;
+  std::uint64_t bytes = 0;     // the data begins here
+  ModelStatements statements;  // of the comments
 
   [[nodiscard]] const PlyElement* find(std::string_view element) const;
 };
 
-/// Parses the header of a PLY file (format 1.0) and locates the elements.
+/// Parses the header of a PLY file (format 1.0), of at most 1 MiB, and locates the elements. Lines
+/// end in LF, CR LF or CR. In binary files, rows of lists before `vertex` are walked.
 /// Throws InputError naming the header line.
 PlyHeader read_ply_header(const ByteSource& file);
 

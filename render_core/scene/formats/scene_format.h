@@ -108,6 +108,9 @@ struct SceneFormat {
                        std::optional<std::size_t> budget) = nullptr;
 
   void (*write)(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to) = nullptr;
+  /// What a written file would not hold of the cloud, for people. Throws InputError where that is
+  /// too much, as `write` does.
+  std::vector<std::string> (*losses)(const GaussianCloud& cloud) = nullptr;
 };
 
 }  // namespace catgs

@@ -15,6 +15,7 @@
 #include "render_core/scene/activations.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
+#include "render_core/scene/formats/model_statements.h"
 #include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/sog_image.h"
 
@@ -246,10 +247,12 @@ SogMeta parse(const ByteSource& file, const std::string& name) {
   else
     version->fail("is not supported", "versions 1 and 2 are");
 
-  if (const auto model = meta.find("model")) {
-    // A model of tomorrow is drawn as the usual one.
-    if (const auto known = splat_model_named(model->text())) sog.model = *known;
-  }
+  ModelStatements statements;
+  if (const auto model = meta.find("model")) static_cast<void>(model->text());
+  statements.read_members(document);
+  if (const auto asset = meta.find("asset")) statements.read_members(asset->value());
+  sog.model = statements.model.value_or(SplatModel::standard);
+  sog.notes = std::move(statements.notes);
   sog.min_log_mean = meta.at("means").at("mins").vec3();
   sog.max_log_mean = meta.at("means").at("maxs").vec3();
   sog.means_low = image_name(meta, "means", 0, 2);
@@ -299,7 +302,7 @@ void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRa
 
 SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadContext& context) {
   const SogMeta meta = read_sog_meta(files, meta_name);
-  SogFile sog{meta.version, {}};
+  SogFile sog{meta.version, {}, meta.notes};
   sog.cloud.resize(meta.count, meta.sh_degree);
   const SogRange all{0, meta.count, 0};
   decode_sog(files, meta, {&all, 1}, sog.cloud, context);
@@ -318,7 +321,7 @@ SceneSize size_of_sog(const SceneFiles& files) {
 DecodedScene read_sog_scene(const SceneFiles& files, const LoadContext& context) {
   SogFile sog = read_sog(*files.open(), index_name, context);
   return {fmt::format("sog v{} ({})", sog.version, files.index.empty() ? "zip" : "folder"),
-          std::move(sog.cloud)};
+          std::move(sog.cloud), std::move(sog.notes)};
 }
 
 }  // namespace
@@ -334,6 +337,7 @@ constexpr SceneFormat sog_format = {
     .size = size_of_sog,
     .read = read_sog_scene,
     .write = write_sog,
+    .losses = sog_losses,
 };
 
 }  // namespace catgs

@@ -18,9 +18,9 @@ namespace catgs {
 
 struct SceneFormat;
 
-// PlayCanvas' SOG ("spatially ordered Gaussians"): one lossless WebP image per attribute, a texel
-// per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises between
-// limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
+// PlayCanvas' SOG ("spatially ordered Gaussians"): one lossless image (WebP, or PNG) per attribute,
+// a texel per Gaussian, and meta.json. As a zip archive (.sog) or as a folder. Version 1 quantises
+// between limits, version 2 by codebooks; SH is a palette and a label per Gaussian.
 
 /// The size of a Gaussian in every SOG, decompressed: a texel in each of five images.
 inline constexpr std::size_t sog_texel_bytes = 4, sog_least_bytes = 5 * sog_texel_bytes;
@@ -35,6 +35,7 @@ struct SogMeta {
   std::uint64_t count = 0;
   int sh_degree = 0;
   SplatModel model = SplatModel::standard;
+  std::vector<std::string> notes{};                  // for people
   glm::vec3 min_log_mean{0.0f}, max_log_mean{0.0f};  // of sign(x) ln(|x| + 1)
   std::array<Channel, 3> log_scale{}, sh0{};
   Channel opacity{};
@@ -69,6 +70,7 @@ void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRa
 struct SogFile {
   int version = 0;
   GaussianCloud cloud;  // not sanitized
+  std::vector<std::string> notes{};
 };
 
 /// Reads the whole SOG whose meta data is `meta_name`. Throws InputError.
@@ -80,6 +82,8 @@ SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadC
 /// SH above is the nearest of 256 values too, of at most 65,536 palette entries, so a larger scene
 /// shares entries. Throws InputError when there are more Gaussians than an image has room for.
 void write_sog(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to);
+/// SceneFormat::losses of it.
+std::vector<std::string> sog_losses(const GaussianCloud& cloud);
 
 extern const SceneFormat sog_format;
 

@@ -7,7 +7,7 @@
 
 namespace catgs {
 
-/// A decoded lossless WebP image, 4 bytes (R, G, B, A) per texel, row by row.
+/// A decoded lossless WebP or PNG image, 4 bytes (R, G, B, A) per texel, row by row.
 struct SogImage {
   std::uint32_t width = 0, height = 0;
   std::vector<std::uint8_t> rgba;
@@ -20,7 +20,8 @@ struct SogImageSize {
   [[nodiscard]] std::uint64_t texels() const { return std::uint64_t{width} * height; }
 };
 
-/// Size of the image from its header. Throws InputError when it is no lossless WebP.
+/// Size of the image from its header. Throws InputError when it is neither a lossless WebP
+/// nor a PNG of 8 bits a channel.
 SogImageSize sog_image_size(const ByteSource& file);
 
 /// Throws InputError.

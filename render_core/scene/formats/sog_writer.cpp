@@ -19,6 +19,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
 #include "render_core/scene/clusters.h"
+#include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/palette.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/formats/zip_writer.h"
@@ -257,6 +258,21 @@ class Writer {
 };
 
 }  // namespace
+
+std::vector<std::string> sog_losses(const GaussianCloud& cloud) {
+  glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
+  for (const glm::vec3& m : cloud.mean) {
+    const glm::vec3 logarithm(log_mean(m.x), log_mean(m.y), log_mean(m.z));
+    low = glm::min(low, logarithm);
+    high = glm::max(high, logarithm);
+  }
+  Losses losses(cloud);
+  losses.positions([steps = (high - low) / 65535.0f](const glm::vec3& mean) {
+    const glm::vec3 at = steps * (1.0f + glm::abs(mean));
+    return std::max({at.x, at.y, at.z});
+  });
+  return std::move(losses).notes();
+}
 
 void write_sog(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to) {
   write_zip(Writer(cloud, pool).files(), to);

@@ -10,6 +10,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
+#include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/scene_format.h"
 
 namespace catgs {
@@ -115,6 +116,14 @@ constexpr SceneFormat splat_format = {
     .read_parts = splat_in_parts,
     .write = [](const GaussianCloud& cloud, ThreadPool&,
                 std::ostream& to) { write_splat(cloud, to); },
+    .losses =
+        [](const GaussianCloud& cloud) {
+          Losses losses(cloud);
+          if (cloud.sh_degree > 0) losses.add("harmonics above degree 0 are left out");
+          losses.harmonics(0, 0, sh_from_colour(0.0f), sh_from_colour(1.0f),
+                           "colours outside of 0…1");
+          return std::move(losses).notes();
+        },
 };
 
 }  // namespace catgs

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -33,6 +34,7 @@ struct Header {
   int sh_degree = 0;
   int fractional_bits = 0;
   bool antialiased = false, has_extensions = false;
+  std::uint8_t unknown_flags = 0;
 };
 
 /// One attribute of all Gaussians: bytes per Gaussian in the file, and the function that stores
@@ -113,8 +115,8 @@ std::vector<Attribute> attributes(const Header& header) {
                  }});
   all.push_back({"scales", 3, [](const std::byte* from, GaussianCloud& cloud, std::size_t i) {
                    for (int k = 0; k < 3; ++k)
-                     cloud.scale[i][k] =
-                         std::exp(static_cast<float>(byte_at(from, k)) / 16.0f - 10.0f);
+                     cloud.scale[i][k] = std::exp(
+                         static_cast<float>(byte_at(from, k)) / log_scale_steps + least_log_scale);
                  }});
   all.push_back(rotation_attribute(header));
   const std::size_t rest = static_cast<std::size_t>(sh_coefficient_count(header.sh_degree)) - 1;
@@ -155,6 +157,8 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
   header.fractional_bits = byte_at(bytes.data(), 13);
   header.antialiased = byte_at(bytes.data(), 14) & antialiased_flag;
   header.has_extensions = byte_at(bytes.data(), 14) & extensions_flag;
+  header.unknown_flags =
+      static_cast<std::uint8_t>(byte_at(bytes.data(), 14) & ~(antialiased_flag | extensions_flag));
   if (load_as<std::uint32_t>(bytes.data()) != magic) fail(file, "magic", "is not 'NGSP'");
   if (header.version < 1 || header.version > 4)
     throw InputError(file.name(), "version",
@@ -171,16 +175,19 @@ Header parse_header(const ByteSource& file, std::span<const std::byte> bytes) {
 
 /// The contents of the extension records.
 struct Extensions {
-  std::uint32_t system = right_up_back_system;
-  std::optional<OrbitLimits> orbit;
+  std::optional<std::uint32_t> system{};  // if they name one
+  std::optional<OrbitLimits> orbit{};
+  std::vector<std::string> notes{};
 };
 
-std::uint32_t parse_system(const ByteSource& file, std::span<const std::byte> payload) {
+std::optional<std::uint32_t> parse_system(const ByteSource& file,
+                                          std::span<const std::byte> payload) {
   const auto system = payload.size() >= 4 ? load_as<std::uint32_t>(payload.data()) : 0;
   if (system > last_system)
     throw InputError(file.name(), "extension SPZ_ADOBE_coordinate_system",
                      fmt::format("coordinate system {} is not in 1…{}", system, last_system));
-  return system == 0 ? right_up_back_system : system;  // 0: unspecified
+  if (system == 0) return std::nullopt;  // unspecified
+  return system;
 }
 
 /// An orbit that makes no sense, or leaves no room as zeros do, is none. The scene does not need
@@ -201,7 +208,7 @@ std::optional<OrbitLimits> parse_orbit(std::span<const std::byte> payload) {
 /// `records`: u32 type, u32 length, payload. Of several of a type the first one counts.
 Extensions parse_extensions(const ByteSource& file, std::span<const std::byte> records) {
   Extensions extensions;
-  std::optional<std::uint32_t> system;
+  bool system_read = false;
   while (records.size() >= 8) {
     const auto type = load_as<std::uint32_t>(records.data());
     const auto length = load_as<std::uint32_t>(records.data() + 4);
@@ -210,10 +217,14 @@ Extensions parse_extensions(const ByteSource& file, std::span<const std::byte> r
       fail(file, fmt::format("extension {:#x}", type), "is longer than the space for extensions");
     const auto payload = records.first(length);
     records = records.subspan(length);
-    if (type == coordinate_system_extension && !system) system = parse_system(file, payload);
-    if (type == safe_orbit_extension && !extensions.orbit) extensions.orbit = parse_orbit(payload);
+    if (type == coordinate_system_extension) {
+      if (!std::exchange(system_read, true)) extensions.system = parse_system(file, payload);
+    } else if (type == safe_orbit_extension) {
+      if (!extensions.orbit) extensions.orbit = parse_orbit(payload);
+    } else if (type != 0) {
+      add_note(extensions.notes, fmt::format("its extension {:#x} is not known", type));
+    }
   }
-  extensions.system = system.value_or(right_up_back_system);
   return extensions;
 }
 
@@ -238,10 +249,32 @@ void turn(std::uint32_t system, GaussianCloud& cloud, const LoadContext& context
 }
 
 SpzFile make_file(const Header& header) {
-  SpzFile file{static_cast<int>(header.version), header.sh_degree, {}, {}};
+  SpzFile file{static_cast<int>(header.version), header.sh_degree, {}};
   file.cloud.resize(header.count, std::min(header.sh_degree, max_sh_degree));
   if (header.antialiased) file.cloud.model = SplatModel::antialiased;
+  if (header.unknown_flags)
+    add_note(file.notes, fmt::format("its flags {:#x} are not known; one may name a model, which "
+                                     "--model or the sidecar's \"model\" can do",
+                                     header.unknown_flags));
   return file;
+}
+
+/// Takes what the extensions say.
+void finish(SpzFile& file, Extensions extensions, SpzAxes axes, const LoadContext& context) {
+  file.orbit = extensions.orbit;
+  for (const std::string& note : extensions.notes) add_note(file.notes, note);
+  if (axes == SpzAxes::as_stored) return;
+  turn(extensions.system.value_or(right_up_back_system), file.cloud, context);
+  if (extensions.system) return;
+  add_note(
+      file.notes,
+      "it does not name its axes, so y points up, as SPZ has it. splat-transform 3, Spark and "
+      "spz-js do not turn the axes: a scene of theirs stands on its head, until --up=+y or the "
+      "sidecar's \"up\": \"+y\" turns it");
+  if (file.version == 2 && file.cloud.model == SplatModel::antialiased)
+    add_note(file.notes,
+             "it says that it is antialiased, as Spark 2.2 says of every scene; --model "
+             "or the sidecar's \"model\" says otherwise");
 }
 
 /// Versions 1 to 3: one gzip stream, which tells the axes only at its end.
@@ -260,9 +293,7 @@ SpzFile read_gzip(const ByteSource& file, const LoadContext& context, SpzAxes ax
     });
   std::vector<std::byte> extensions(header.has_extensions ? max_extension_bytes : 0);
   const auto stored = std::span(extensions).first(stream->read_up_to(extensions));
-  const Extensions said = parse_extensions(file, stored);
-  result.orbit = said.orbit;
-  if (axes == SpzAxes::right_down_front) turn(said.system, result.cloud, context.part(0.9, 1.0));
+  finish(result, parse_extensions(file, stored), axes, context.part(0.9, 1.0));
   return result;
 }
 
@@ -284,7 +315,7 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes a
 
   std::vector<std::byte> extensions(table_offset - plain_header_bytes);
   file.read(plain_header_bytes, extensions);
-  const Extensions said = header.has_extensions ? parse_extensions(file, extensions) : Extensions{};
+  Extensions said = header.has_extensions ? parse_extensions(file, extensions) : Extensions{};
 
   std::vector<std::array<std::uint64_t, 2>> sizes(all.size());
   file.read(table_offset, std::as_writable_bytes(std::span(sizes)));
@@ -303,8 +334,7 @@ SpzFile read_plain(const ByteSource& file, const LoadContext& context, SpzAxes a
   context.part(0.0, 0.9).for_blocks(all.size(), 1, [&](std::size_t a, std::size_t) {
     read_attribute(*open_zstd(file, offsets[a], sizes[a][0]), all[a], result.cloud, [] {});
   });
-  result.orbit = said.orbit;
-  if (axes == SpzAxes::right_down_front) turn(said.system, result.cloud, context.part(0.9, 1.0));
+  finish(result, std::move(said), axes, context.part(0.9, 1.0));
   return result;
 }
 
@@ -336,11 +366,13 @@ constexpr SceneFormat spz_format = {
     .size = [](const SceneFiles& files) { return read_spz_size(FileSource(files.path)); },
     .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
       SpzFile spz = read_spz(FileSource(files.path), context);
-      return {fmt::format("spz v{}", spz.version), std::move(spz.cloud),
-              notes_of_degree(spz.sh_degree), spz.orbit};
+      for (const std::string& note : notes_of_degree(spz.sh_degree)) add_note(spz.notes, note);
+      return {fmt::format("spz v{}", spz.version), std::move(spz.cloud), std::move(spz.notes),
+              spz.orbit};
     },
     .write = [](const GaussianCloud& cloud, ThreadPool&,
                 std::ostream& to) { write_spz(cloud, to); },
+    .losses = spz_losses,
 };
 
 }  // namespace catgs

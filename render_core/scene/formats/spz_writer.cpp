@@ -13,6 +13,7 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/activations.h"
 #include "render_core/scene/formats/axes.h"
+#include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/spz_format.h"
 
@@ -23,8 +24,10 @@ namespace {
 using namespace spz;
 
 constexpr int version = 3;
-constexpr int max_fractional_bits = 16;
-constexpr int position_bits = 23;  // and a sign
+// Usual scenes have the first. Those of small Gaussians have more, as the format's 24 bits allow.
+constexpr int usual_fractional_bits = 16, max_fractional_bits = 23;
+constexpr float steps_of_median = 64.0f;  // or more, in a scale of the median Gaussian
+constexpr int position_bits = 23;         // and a sign
 // The precision of Niantic's writer. Bits of mere noise would double the file.
 constexpr int sh1_bits = 5;
 constexpr int sh_rest_bits = 4;
@@ -65,10 +68,19 @@ class GzipWriter {
 };
 
 int fractional_bits_for(const GaussianCloud& cloud) {
+  std::vector<float> sizes;
   float largest = 0.0f;
-  for (const glm::vec3& m : cloud.mean)
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const glm::vec3& m = cloud.mean[i];
     largest = std::max({largest, std::abs(m.x), std::abs(m.y), std::abs(m.z)});
-  int bits = max_fractional_bits;
+    sizes.push_back(middle_scale(cloud.scale[i]));
+  }
+  int bits = usual_fractional_bits;
+  if (const auto median = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+      median != sizes.end()) {
+    std::ranges::nth_element(sizes, median);
+    while (bits < max_fractional_bits && std::ldexp(*median, bits) < steps_of_median) ++bits;
+  }
   const auto fits = [&] {
     return std::ldexp(largest, bits) < static_cast<float>((1 << position_bits) - 1);
   };
@@ -111,6 +123,20 @@ char quantised_sh(float value, int bits) {
 
 }  // namespace
 
+std::vector<std::string> spz_losses(const GaussianCloud& cloud) {
+  Losses losses(cloud);
+  const float step = std::ldexp(1.0f, -fractional_bits_for(cloud));
+  losses.positions([step](const glm::vec3&) { return step; });
+  const float half_step = 0.5f / log_scale_steps;
+  losses.scales(std::exp(least_log_scale - half_step),
+                std::exp(least_log_scale + 255.0f / log_scale_steps + half_step));
+  losses.harmonics(0, 0, -most_sh0, most_sh0,
+                   fmt::format("colours outside of {:.2f}…{:.2f}", colour_from_sh(-most_sh0),
+                               colour_from_sh(most_sh0)));
+  losses.harmonics(1, max_sh_degree, -1.0f, 1.0f, "harmonics outside of -1…1");
+  return std::move(losses).notes();
+}
+
 void write_spz(const GaussianCloud& cloud, std::ostream& to) {
   const AxisFlip flip(right_up_back);
   const int fractional_bits = fractional_bits_for(cloud);
@@ -148,7 +174,8 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
       append_byte(out, 255.0f * (colour_scale * cloud.sh_of(i)[0][k] + 0.5f));
   });
   write_attribute([&](std::string& out, std::size_t i) {
-    for (int k = 0; k < 3; ++k) append_byte(out, 16.0f * (std::log(cloud.scale[i][k]) + 10.0f));
+    for (int k = 0; k < 3; ++k)
+      append_byte(out, log_scale_steps * (std::log(cloud.scale[i][k]) - least_log_scale));
   });
   write_attribute([&](std::string& out, std::size_t i) {
     append_smallest_three(out, flip.rotation(cloud.rotation[i]));

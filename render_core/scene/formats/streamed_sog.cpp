@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/scene_format.h"
 
@@ -277,6 +278,8 @@ OpenLevels open_levels(const std::shared_ptr<const FileSet>& files, const std::s
   scene.sh_degree = sog->sh_degree;
   scene.count = sog->count;
   scene.parts = sog->parts.size();
+  for (const StreamedSogPart& part : sog->parts)
+    for (const std::string& note : part.meta.notes) add_note(scene.notes, note);
   scene.read = [files, sog](std::size_t part, const LoadContext& context) {
     return read_streamed_sog_part(*files, *sog, part, context);
   };

@@ -16,8 +16,10 @@
 #include "render_core/base/error.h"
 #include "render_core/scene/copy_gaussians.h"
 #include "render_core/scene/formats/axes.h"
+#include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/gltf.h"
 #include "render_core/scene/formats/gltf_document.h"
+#include "render_core/scene/formats/implicit_tiles.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/transform.h"
@@ -28,7 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t most_notes = 32;
 constexpr std::uint64_t max_tileset_bytes = 32 << 20;
 constexpr std::size_t max_tiles = std::size_t{1} << 16;
 constexpr int max_tile_depth = 64;  // in one file
@@ -118,6 +119,11 @@ class TilesetReader {
                  std::vector<External>& found);
   void read_content(const JsonField& content, std::size_t node, const AffineMap& map,
                     std::vector<External>& found);
+  /// `field`: for error messages.
+  void read_content_at(const std::string& uri, const JsonField& field, std::size_t node,
+                       const AffineMap& map, std::vector<External>& found);
+  void read_implicit(const JsonField& tile, std::size_t node, const AffineMap& map,
+                     std::vector<External>& found);
   Content read_gltf_content(const std::string& name, const AffineMap& map) const;
 
   const FileSet& files_;
@@ -156,8 +162,6 @@ void TilesetReader::read_tile(const JsonField& tile, const Above& above, int dep
   if (depth > max_tile_depth) tile.fail(fmt::format("lies deeper than {}", max_tile_depth));
   if (tileset_.tree.nodes.size() == max_tiles)
     tile.fail(fmt::format("is one of more than {}", max_tiles));
-  if (const auto implicit = tile.find("implicitTiling"))
-    implicit->fail("is not supported", "make the tiles with explicit tiling");
   AffineMap map = above.map;
   if (const auto transform = tile.find("transform")) map = map * affine_map(*transform);
   if (!map.usable()) tile.fail("has a transform without an inverse");
@@ -167,6 +171,7 @@ void TilesetReader::read_tile(const JsonField& tile, const Above& above, int dep
     if (const auto volume = tile.find("boundingVolume")) tileset_.middle = middle_of(*volume, map);
   const std::size_t node = tileset_.tree.add(above.node, adds);
   tileset_.contents.emplace_back();
+  if (tile.find("implicitTiling")) return read_implicit(tile, node, map, found);
   if (const auto content = tile.find("content")) read_content(*content, node, map, found);
   if (const auto contents = tile.find("contents"))
     for (std::size_t i = 0; i < contents->size(); ++i)
@@ -180,11 +185,16 @@ void TilesetReader::read_content(const JsonField& content, std::size_t node, con
                                  std::vector<External>& found) {
   const auto named = content.find("uri");
   const JsonField uri = named ? *named : content.at("url");  // before version 1.0
-  const std::string text = uri.text();
-  if (text.size() > max_uri_bytes) uri.fail(fmt::format("has more than {} bytes", max_uri_bytes));
-  const std::string path = text.substr(0, text.find_first_of("?#"));
+  read_content_at(uri.text(), uri, node, map, found);
+}
+
+void TilesetReader::read_content_at(const std::string& uri, const JsonField& field,
+                                    std::size_t node, const AffineMap& map,
+                                    std::vector<External>& found) {
+  if (uri.size() > max_uri_bytes) field.fail(fmt::format("has more than {} bytes", max_uri_bytes));
+  const std::string path = uri.substr(0, uri.find_first_of("?#"));
   if (path.find(':') < path.find('/'))  // a scheme
-    uri.fail("names no file of the scene's folder");
+    field.fail("names no file of the scene's folder");
   const std::string name = FilesBelow::name_of(folder_, unescaped(path));
   if (name.ends_with(".json")) {
     found.push_back({name, {node, map, tileset_.tree.nodes[node].adds}});
@@ -193,6 +203,21 @@ void TilesetReader::read_content(const JsonField& content, std::size_t node, con
   Content read = read_gltf_content(name, map);
   tileset_.tree.add_gaussians(node, read.size.count);
   tileset_.contents[node].push_back(std::move(read));
+}
+
+/// All tiles move as the tile that stands for them.
+void TilesetReader::read_implicit(const JsonField& tile, std::size_t node, const AffineMap& map,
+                                  std::vector<External>& found) {
+  const bool adds = tileset_.tree.nodes[node].adds;
+  const std::vector<ImplicitTile> tiles = read_implicit_tiles(
+      tile, FilesBelow(files_, folder_), max_tiles - tileset_.tree.nodes.size() + 1);
+  std::vector<std::size_t> nodes;
+  for (const ImplicitTile& one : tiles) {
+    nodes.push_back(one.above ? tileset_.tree.add(nodes[*one.above], adds) : node);
+    if (one.above) tileset_.contents.emplace_back();
+    for (const std::string& uri : one.contents)
+      read_content_at(uri, tile, nodes.back(), map, found);
+  }
 }
 
 Content TilesetReader::read_gltf_content(const std::string& name, const AffineMap& map) const {
@@ -268,10 +293,7 @@ OpenLevels open_tiles(const std::shared_ptr<const FileSet>& folder, const std::s
     for (Content& content : tileset.contents[node]) {
       bytes += content.size.bytes;
       scene.sh_degree = std::max(scene.sh_degree, content.size.sh_degree);
-      for (const std::string& note : content.size.notes)
-        if (scene.notes.size() < most_notes &&
-            std::find(scene.notes.begin(), scene.notes.end(), note) == scene.notes.end())
-          scene.notes.push_back(note);
+      for (const std::string& note : content.size.notes) add_note(scene.notes, note);
       chosen->contents.push_back(std::move(content));
     }
   require_plausible_count(*file, "root", scene.count, GaussianCloud::bytes(1, scene.sh_degree),

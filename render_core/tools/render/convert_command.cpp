@@ -177,6 +177,7 @@ void convert(const ConvertOptions& options, bool quiet) {
   constexpr bool first_view = false;  // would be estimated anew from the file that is written
   Scene scene = load_scene(conversion.in, options.in, options.threads, quiet, first_view);
   const EditCounts counts = edit_whole(scene.cloud, conversion, quiet);
+  print_notes(losses_of(scene.cloud, options.out));
   save(scene, options, quiet);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
              scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),

@@ -73,6 +73,14 @@ std::map<std::string, std::string> gltf_seeds() {
   seeds["linear"] = seed(nodes);
   seeds["spz"] =
       seed(test::gltf_with_spz(test::encode_spz(test::random_cloud(3, 1), {.version = 4})));
+  test::GltfParts sparse = test::encode_gltf(test::random_cloud(3, 0));
+  sparse.json["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", sparse.binary.size()}, {"byteLength", 13}});
+  sparse.binary += '\1' + std::string(12, '\0');
+  sparse.json["accessors"][0]["sparse"] = nlohmann::json::parse(R"({"count": 1, "indices":
+    {"bufferView": 5, "componentType": 5121}, "values": {"bufferView": 5, "byteOffset": 1}})");
+  sparse.json["accessors"][4].erase("bufferView");
+  seeds["sparse"] = seed(sparse);
   seeds["whole"] = test::encode_gltf(test::random_cloud(1, 0)).glb();
   nodes.json["buffers"][0]["uri"] = "a.bin";
   seeds["beside"] = nodes.json.dump();
@@ -92,7 +100,8 @@ std::vector<Target> gltf_targets() {
                   "componentType": "normalized": "count": "type": "VEC3" "VEC4" "SCALAR" 5120 5121
                   5122 5123 5126 "nodes": "children": "matrix": "mesh": "scenes": "scene": "uri":
                   "primitives": "attributes": "POSITION": "KHR_gaussian_splatting": "extensions":
-                  "KHR_gaussian_splatting_compression_spz_2": "bufferView":)"),
+                  "KHR_gaussian_splatting_compression_spz_2": "bufferView": "sparse": "indices":
+                  "values": "antialiased": true 5125)"),
            .change = change_gltf,
            .max_bytes = 8192}};
 }

@@ -1,7 +1,9 @@
 // Scenes of many files with levels of detail: 3D Tiles and LCC2.
 #include <iterator>
 #include <optional>
+#include <vector>
 
+#include "render_core/scene/formats/lcc.h"
 #include "render_core/scene/formats/lcc2.h"
 #include "render_core/scene/formats/tiles.h"
 #include "tests/fuzz/target.h"
@@ -53,6 +55,12 @@ void parse_levels(Bytes input, const Open& open) {
 void parse_tiles(Bytes input) {
   parse_levels<FilesWithGlb>(input, [](const auto& files, std::optional<std::size_t> budget) {
     return open_tiles(files, "tileset.json", {}, budget);
+  });
+}
+
+void parse_lcc(Bytes input) {
+  parse_levels<PackedFiles>(input, [](const auto& files, std::optional<std::size_t> budget) {
+    return open_lcc(files, "a.lcc", {}, budget);
   });
 }
 
@@ -117,7 +125,42 @@ std::map<std::string, std::string> tiles_seeds() {
              {"region":[1,0.5,1,0.5,0,9]},"content":{"url":"a.glb"},"children":[{"content":{"uri":
              "c/t.json"}}]}})",
                             R"({"asset":{"version":"1.1"},"root":{"content":{"uri":"../b.glb"},
-             "boundingVolume":{"sphere":[0,0,0,1]},"children":[{"content":{"uri":"d.glb"}}]}})")}};
+             "boundingVolume":{"sphere":[0,0,0,1]},"children":[{"content":{"uri":"d.glb"}}]}})")},
+          {"implicit",
+           folder(R"({"asset":{"version":"1.1"},"root":{"refine":"ADD","content":
+             {"uri":"c/d.glb"},"implicitTiling":{"subdivisionScheme":"OCTREE",
+             "availableLevels":1,"subtreeLevels":1,"subtrees":{"uri":"c/t.json"}}}})",
+                  R"({"tileAvailability":{"constant":1},"contentAvailability":[{"constant":1}],
+             "childSubtreeAvailability":{"constant":0}})")}};
+}
+
+/// `levels` of a cell with so many Gaussians, and as many around it.
+std::string lcc_seed(const std::vector<std::int32_t>& levels, bool has_sh) {
+  std::string index(4, '\0'), data, sh;
+  const auto append = [&index]<class T>(T value) {
+    index.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (const std::int32_t count : levels) {
+    append(count);
+    append(static_cast<std::int64_t>(data.size()));
+    append(32 * count);
+    data.append(static_cast<std::size_t>(32 * count), '\x3d');
+    sh.append(static_cast<std::size_t>(64 * count), '\x77');
+  }
+  const std::string range = R"(","min":[0.1,0.1,0.1],"max":[2,2,2]})";
+  return packed(
+      {{"a.lcc", R"({"totalLevel":)" + std::to_string(levels.size()) +
+                     R"(,"encoding":"COMPRESS","fileType":")" + (has_sh ? "Quality" : "Portable") +
+                     R"(","attributes":[{"name":"scale)" + range + R"(,{"name":"shcoef)" + range +
+                     R"(,{"name":"envscale)" + range + "]}"},
+       {"index.bin", index},
+       {"data.bin", data},
+       {"shcoef.bin", sh},
+       {"environment.bin", data}});
+}
+
+std::map<std::string, std::string> lcc_seeds() {
+  return {{"portable", lcc_seed({4, 2}, false)}, {"quality", lcc_seed({3, 0, 3}, true)}};
 }
 
 std::map<std::string, std::string> lcc2_seeds() {
@@ -152,6 +195,14 @@ std::vector<Target> levels_targets() {
                   "url": "refine": "ADD" "REPLACE" "transform": "boundingVolume": "box": "sphere":
                   "region": "extensionsRequired": "implicitTiling": "a.glb" "b.glb" "c/d.glb"
                   "c/t.json" "../b.glb" "tileset.json" b3dm)"),
+           .change = change_levels,
+           .max_bytes = 16384},
+          {.name = "lcc",
+           .parse = parse_lcc,
+           .seeds = lcc_seeds,
+           .dictionary = words_of(
+               R"("totalLevel": "attributes": "name": "min": "max": "scale" "shcoef" "envscale"
+                  "envshcoef" "encoding": "COMPRESS" "fileType": "Portable" "Quality")"),
            .change = change_levels,
            .max_bytes = 16384},
           {.name = "lcc2",

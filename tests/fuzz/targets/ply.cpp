@@ -1,5 +1,6 @@
 #include "render_core/scene/formats/ply.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include "render_core/scene/formats/compressed_ply.h"
@@ -47,6 +48,22 @@ std::map<std::string, std::string> plain_seeds() {
   seeds["hard_to_sort"] = hard.str();
   seeds["ascii"] = two_rows("ascii", "float", "-0.5e-1 ");
   seeds["big_endian"] = two_rows("binary_big_endian", "double", std::string(8, '\0'));
+  std::string lists = two_rows("ascii", "double", "0.5 ");
+  lists.insert(lists.find("element vertex"), "element edge 2\nproperty list uchar float at\n");
+  seeds["lists_ascii"] = lists.insert(lists.find("end_header\n") + 11, "2 1 1\n0\n");
+  lists = two_rows("binary_big_endian", "float", std::string(4, '\0'));
+  lists.insert(lists.find("element vertex"), "element edge 2\nproperty list short int at\n");
+  seeds["lists"] =
+      lists.insert(lists.find("end_header\n") + 11, std::string("\0\1\0\0\0\7\0\0", 8));
+  std::string colours = two_rows("binary_little_endian", "uchar", std::string(1, '\1'));
+  for (const auto& [from, to] : {std::pair("f_dc_0", "red"),
+                                 {"f_dc_1", "green"},
+                                 {"f_dc_2", "blue"},
+                                 {"rot_0", "scalar_rot_0"},
+                                 {"scale_0", "scal_scale_0"}})
+    colours.replace(colours.find(from), std::string(from).size(), to);
+  std::ranges::replace(colours, '\n', '\r');
+  seeds["colours"] = colours;
   seeds["half"] = two_rows("binary_little_endian", "short", std::string(2, '\1'));
   return seeds;
 }

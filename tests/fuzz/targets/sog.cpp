@@ -154,7 +154,9 @@ std::map<std::string, std::string> webp_seeds() {
   std::string noise;
   for (int i = 0; i < 4 * 64; ++i) noise.push_back(static_cast<char>(i * i * 37));
   return {{"flat", test::encode_webp(std::string(4 * 64, '\7'), 8, 8)},
-          {"noise", test::encode_webp(noise, 16, 4)}};
+          {"noise", test::encode_webp(noise, 16, 4)},
+          {"png", test::encode_png(noise, 16, 4)},
+          {"png_rgb", test::encode_png(noise, 8, 8, false)}};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -104,6 +105,60 @@ TEST_F(Colmap, BinaryFilesAreRead) {
 TEST_F(Colmap, TextFilesAreRead) {
   write_text();
   expect_both_images();
+}
+
+TEST_F(Colmap, StrayEmptyLinesDoNotMatter) {
+  const std::string b = "1 0.70710678118 0 0 0.70710678118 2 -1 -3 5 b.jpg",
+                    a = "2 2 0 0 0 0 0 0 5 a.jpg";
+  const std::string points = "10 20 -1 1.5e1 -3 7";
+  for (const std::string& text : {
+           "\n\n" + b + "\n" + points + "\n" + a + "\n\n",
+           b + "\n" + points + "\n\n\n" + a + "\n\n\n\n",
+           b + "\n\n" + points + "\n" + a + "\n",
+           b + "\n" + a,
+           b + "\n \t\n" + a + "\n" + points + "\n  \n",
+           "\r\n" + b + " \r\n" + points + " \r\n\r\n" + a + "\r\n\r\n",
+       }) {
+    SCOPED_TRACE(text);
+    write("cameras.txt", "\n  \n" + std::string(cameras_txt) + " \n");
+    write("images.txt", text);
+    expect_both_images();
+  }
+}
+
+TEST_F(Colmap, LaterModelsAreReadWithoutTheirDistortion) {
+  struct Case {
+    int id;
+    const char* name;
+    std::size_t parameters;
+  };
+  for (const Case& c : std::vector<Case>{{11, "RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                         {12, "SIMPLE_DIVISION", 4},
+                                         {13, "DIVISION", 5},
+                                         {14, "SIMPLE_FISHEYE", 3},
+                                         {15, "FISHEYE", 4},
+                                         {16, "EUCM", 6}}) {
+    SCOPED_TRACE(c.name);
+    std::string text = fmt::format("5 {} 640 480", c.name);
+    Bytes bytes;
+    bytes.add<std::uint64_t>(1).add<std::uint32_t>(5).add<std::int32_t>(c.id);
+    bytes.add<std::uint64_t>(640).add<std::uint64_t>(480);
+    for (std::size_t i = 0; i < c.parameters; ++i) {
+      text += fmt::format(" {}", 100 + i);
+      bytes.add(100.0 + static_cast<double>(i));
+    }
+    std::filesystem::remove(folder_ / "images.bin");
+    write("images.txt", images_txt);
+    write("cameras.txt", text + "\n");
+    EXPECT_EQ(read_colmap(folder_.path(), Distortion::ignored).size(), 2u);
+    expect_refused("cameras.txt", "line 1");
+    write("images.bin", images_bin());
+    write("cameras.bin", bytes.text());
+    EXPECT_EQ(read_colmap(folder_.path(), Distortion::ignored).size(), 2u);
+    expect_refused("cameras.bin", "byte 8");
+  }
+  write("cameras.bin", cameras_bin(17));  // a panorama
+  EXPECT_THROW((void)read_colmap(folder_.path(), Distortion::ignored), InputError);
 }
 
 TEST_F(Colmap, TruncatedFilesAreRefusedAtEveryLength) {

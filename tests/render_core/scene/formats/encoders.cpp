@@ -13,6 +13,7 @@
 #include <glm/exponential.hpp>
 #include <glm/gtc/packing.hpp>
 #include <nlohmann/json.hpp>
+#include <png.h>
 #include <webp/encode.h>
 #include <zlib.h>
 #include <zstd.h>
@@ -292,6 +293,22 @@ std::string encode_webp(const std::string& rgba, int width, int height, bool los
   std::string out(reinterpret_cast<const char*>(writer.mem), writer.size);
   WebPMemoryWriterClear(&writer);
   WebPPictureFree(&picture);
+  return out;
+}
+
+std::string encode_png(const std::string& rgba, int width, int height, bool alpha) {
+  std::string texels;
+  for (std::size_t i = 0; i < rgba.size(); i += 4) texels += rgba.substr(i, alpha ? 4 : 3);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(width);
+  image.height = static_cast<png_uint_32>(height);
+  image.format = alpha ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string out(size, '\0');
+  if (!png_image_write_to_memory(&image, out.data(), &size, 0, texels.data(), 0, nullptr))
+    throw std::runtime_error(image.message);
+  out.resize(size);
   return out;
 }
 

@@ -39,5 +39,7 @@ std::map<std::string, std::string> files_below(const std::filesystem::path& fold
 
 /// Lossless (or lossy) WebP of RGBA texels.
 std::string encode_webp(const std::string& rgba, int width, int height, bool lossless = true);
+/// PNG of 8 bits a channel. Without alpha, the fourth of each texel's bytes is left out.
+std::string encode_png(const std::string& rgba, int width, int height, bool alpha = true);
 
 }  // namespace catgs::test

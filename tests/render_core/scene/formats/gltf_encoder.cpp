@@ -67,7 +67,7 @@ std::vector<Table> tables_of(const GaussianCloud& cloud, const GltfStyle& style)
   for (int degree = 0; degree <= cloud.sh_degree; ++degree)
     for (int m = 0; m <= 2 * degree; ++m)
       all.push_back({khr + "SH_DEGREE_" + std::to_string(degree) + "_COEF_" + std::to_string(m),
-                     "float",
+                     style.sh,
                      3,
                      {}});
   for (std::size_t i = 0; i < cloud.size(); ++i) {

@@ -15,6 +15,7 @@ std::string glb(const std::string& json, const std::string& binary);
 /// " normalized" behind it.
 struct GltfStyle {
   std::string position = "float", rotation = "float", scale = "float", opacity = "float";
+  std::string sh = "float";
   bool interleaved = false;  // an attribute beside the other of each Gaussian
 };
 

@@ -27,6 +27,7 @@ GaussianCloud storable_cloud(std::size_t count, int sh_degree) {
     cloud.mean[i] = glm::clamp(cloud.mean[i] / 16.0f, -1.0f, 1.0f);
     cloud.scale[i] = glm::clamp(10.0f * cloud.scale[i], 0.2f, 1.0f);
   }
+  for (glm::vec3& sh : cloud.sh) sh = glm::clamp(sh, -1.0f, 1.0f);
   return cloud;
 }
 
@@ -43,20 +44,28 @@ TEST(Gltf, FilesAreReadAndTurnedToRightDownFront) {
            {{.position = "short normalized",
            .rotation = "short normalized",
            .scale = "unsigned_short normalized",
-           .opacity = "unsigned_short normalized"},
+           .opacity = "unsigned_short normalized",
+           .sh = "short normalized"},
             {.mean = 0.51f / 32767,
             .log_scale = 0.51f / 65535 / 0.2f,
             .rotation_rad = quat_angle(0.51f / 32767),
-            .opacity = 0.51f / 65535}},
+            .opacity = 0.51f / 65535,
+            .sh0 = 0.51f / 32767,
+            .sh1 = 0.51f / 32767,
+            .sh_rest = 0.51f / 32767}},
            {{.position = "byte normalized",
            .rotation = "byte normalized",
-           .scale = "unsigned_byte normalized",
+           .scale = "byte normalized",
            .opacity = "unsigned_byte normalized",
+           .sh = "byte normalized",
            .interleaved = true},
             {.mean = 0.51f / 127,
-            .log_scale = 0.52f / 255 / 0.2f,
+            .log_scale = 0.52f / 127 / 0.2f,
             .rotation_rad = quat_angle(0.51f / 127),
-            .opacity = 0.51f / 255}},
+            .opacity = 0.51f / 255,
+            .sh0 = 0.51f / 127,
+            .sh1 = 0.51f / 127,
+            .sh_rest = 0.51f / 127}},
        })
     for (const int degree : {0, 1, 2, 3}) {
       SCOPED_TRACE(style.position + ", degree " + std::to_string(degree));

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "render_core/scene/formats/sog_image.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/json_refusals.h"
 
@@ -63,7 +64,16 @@ TEST(Sog, MetaDataTellsTheModel) {
   EXPECT_EQ(model_with("default"), SplatModel::standard);
   EXPECT_EQ(model_with("antialiased"), SplatModel::antialiased);
   EXPECT_EQ(model_with("2dgs"), SplatModel::surfels);
+  EXPECT_EQ(model_with("Mip"), SplatModel::antialiased);
   EXPECT_EQ(model_with("tomorrow"), SplatModel::standard);
+  const auto notes_with = [&](const char* key, const nlohmann::json& value) {
+    return parse(zip(with_meta(files, [&](nlohmann::json& meta) { meta[key] = value; }))).notes;
+  };
+  EXPECT_TRUE(notes_with("model", "antialiased").empty());
+  EXPECT_THAT(notes_with("model", "tomorrow"),
+              testing::ElementsAre(testing::HasSubstr("tomorrow")));
+  EXPECT_EQ(notes_with("antialiasing", "of a kind").size(), 1u);
+  EXPECT_EQ(notes_with("asset", {{"antialiased", 3}}).size(), 1u);
   EXPECT_EQ(refusal_of([&] { model_with(7); }), (Refusal{"scene.sog/meta.json", "model"}));
 }
 
@@ -106,6 +116,50 @@ TEST(Sog, RangesAreDecodedToTheirPlaces) {
     EXPECT_LT(glm::distance(read.sh_of(i)[3], cloud.sh_of(from)[3]), 0.01f);
     EXPECT_EQ(read.sh_of(i)[4], glm::vec3(0.0f));
   }
+}
+
+TEST(Sog, ImagesMayBePng) {
+  const GaussianCloud cloud = random_cloud(500, 1);
+  const Files webp = encode_sog(cloud, 2);
+  const GaussianCloud wanted = parse(zip(webp)).cloud;
+  for (const bool alpha : {true, false}) {  // what has no alpha has 255 there
+    Files files;
+    for (const auto& [name, content] : webp) {
+      if (!name.ends_with(".webp")) continue;
+      const SogImage image = read_sog_image(MemorySource(name, bytes_of(content)));
+      const std::string rgba(image.rgba.begin(), image.rgba.end());
+      bool opaque = true;
+      for (std::size_t i = 3; i < rgba.size(); i += 4) opaque &= rgba[i] == '\xff';
+      files[name.substr(0, name.size() - 4) + "png"] = encode_png(
+          rgba, static_cast<int>(image.width), static_cast<int>(image.height), alpha || !opaque);
+    }
+    std::string& meta = files["meta.json"] = webp.at("meta.json");
+    for (std::size_t at; (at = meta.find(".webp")) != std::string::npos;)
+      meta.replace(at, 5, ".png");
+    const GaussianCloud read = parse(zip(files)).cloud;
+    EXPECT_EQ(read.mean, wanted.mean);
+    EXPECT_EQ(read.rotation, wanted.rotation);
+    EXPECT_EQ(read.scale, wanted.scale);
+    EXPECT_EQ(read.opacity, wanted.opacity);
+    EXPECT_EQ(read.sh, wanted.sh);
+  }
+}
+
+TEST(Sog, DamagedPngIsRefused) {
+  const std::string png = encode_png(std::string(4 * 64 * 64, '\x37'), 64, 64);
+  const auto where = [](const std::string& bytes) {
+    return refusal_of([&] { read_sog_image(MemorySource("a.png", bytes_of(bytes))); }).where;
+  };
+  for (std::size_t length = 0; length < png.size() - 16;
+       ++length)  // its last chunks are not needed
+    EXPECT_EQ(where(png.substr(0, length)), length < 26 ? "byte 0" : "") << length;
+  const auto with = [&](std::size_t at, const std::string& bytes) {
+    return where(std::string(png).replace(at, bytes.size(), bytes));
+  };
+  EXPECT_EQ(with(16, "\x7f"), "byte 16");                  // 2^31 wide
+  EXPECT_EQ(with(24, "\x10"), "byte 24");                  // 16 bits
+  EXPECT_EQ(with(25, std::string("\x03", 1)), "byte 24");  // a palette
+  EXPECT_EQ(with(60, "\x01\x02\x03"), "");
 }
 
 TEST(Sog, AMissingFirstCodebookValueIsContinued) {

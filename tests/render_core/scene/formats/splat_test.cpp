@@ -1,5 +1,6 @@
 #include "render_core/scene/formats/splat.h"
 
+#include "render_core/scene/formats/scene_format.h"
 #include "tests/render_core/scene/scene_test_support.h"
 
 namespace catgs::test {
@@ -49,6 +50,19 @@ TEST(Splat, OddSizesAreRefused) {
       "scene.splat: byte 33: the size of a .splat file is a multiple of 32 bytes (the file is "
       "cut off or of another format)");
   EXPECT_EQ(refusal_of([] { parse(""); }), (Refusal{"scene.splat", ""}));
+}
+
+TEST(Splat, LossesAreTold) {
+  using ::testing::ElementsAre;
+  using ::testing::HasSubstr;
+  GaussianCloud cloud = random_cloud(300, 0);
+  for (glm::vec3& sh : cloud.sh) sh = glm::vec3(0.5f);
+  EXPECT_TRUE(splat_format.losses(cloud).empty());
+  cloud.sh[7].y = 2.0f;
+  cloud.sh[8].z = -2.0f;
+  EXPECT_THAT(splat_format.losses(cloud),
+              ElementsAre(HasSubstr("2 of 300 Gaussians have colours outside of 0…1")));
+  EXPECT_THAT(splat_format.losses(random_cloud(300, 1)), testing::Contains(HasSubstr("harmonics")));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Convert : public CatgsRender {
  protected:
@@ -150,6 +151,14 @@ TEST_F(Convert, RefusesToWriteOverTheFileOfAFolder) {
       run(fmt::format("convert {} {} --merge 10", path("hall"), path("hall/hall.ply")));
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.out, HasSubstr("another name"));
+}
+
+TEST_F(Convert, LossesOfTheOutputAreTold) {
+  const std::string small = "--scale 1e-4";
+  EXPECT_THAT(convert("small.spz", small).out,
+              HasSubstr("note: 400 of 400 Gaussians are smaller than 4.4e-05"));
+  EXPECT_THAT(convert("small.ply", small).out, Not(HasSubstr("note:")));
+  EXPECT_THAT(run("info " + path("small.spz")).out, HasSubstr("does not name its axes"));
 }
 
 }  // namespace

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "render_core/scene/splat_model.h"
+
+namespace catgs {
+
+/// The statements of a file about its model, in comments and fields of its exporter's own. Case,
+/// "_" and "-" do not count in them. They are read in the order of the file:
+///
+///   SplatRenderMode: mip                    Brush, gsplat, nerfstudio, splat-transform
+///   SplatRenderMode: mip-0.1                NeRFICG
+///   antialiased 1, postshot.anti_aliasing=1 Postshot
+///   fvdb_ply_af_8198767135antialias|int64|1 fVDB
+struct ModelStatements {
+  std::optional<SplatModel> model{};  // of the last statement that is understood
+  std::vector<std::string> notes{};   // about those that are not, for people
+
+  void read(std::string_view text);
+  /// Reads each member as "key: value". The member "model" is a statement, too.
+  void read_members(const nlohmann::json& object);
+};
+
+}  // namespace catgs
