@@ -9,6 +9,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/colmap.h"
+#include "render_core/scene/scene_origin.h"
 
 namespace catgs {
 namespace {
@@ -56,18 +57,36 @@ CameraPath timed(const fs::path& path, const std::vector<ListedCamera>& cameras,
   return result;
 }
 
-}  // namespace
-
-CameraPath read_camera_path(const fs::path& path, double rate_hz) {
+CameraPath read_about(const fs::path& path, double rate_hz, const glm::dvec3& origin) {
   if (const auto folder = colmap_folder(path))
-    return timed(path, read_colmap(*folder, Distortion::ignored), rate_hz);
+    return timed(path, read_colmap(*folder, Distortion::ignored, origin), rate_hz);
   if (is_json(path)) {
-    const CameraList list = read_camera_json(FileSource(path));
+    const CameraList list = read_camera_json(FileSource(path), origin);
     return timed(path, list.cameras, list.rate_hz.value_or(rate_hz));
   }
   CameraPath result;
-  result.poses = read_tum(path);
+  result.poses = read_tum(path, origin);
   return result;
+}
+
+}  // namespace
+
+CameraPath read_camera_path(const fs::path& path, double rate_hz) {
+  CameraPath result = read_about(path, rate_hz, glm::dvec3(0.0));
+  const glm::dvec3 origin = origin_near(result.poses.front().world_from_camera.position);
+  if (origin == glm::dvec3(0.0)) return result;
+  result = read_about(path, rate_hz, origin);
+  result.origin = origin;
+  return result;
+}
+
+Trajectory CameraPath::poses_about(const glm::dvec3& scene_origin) const {
+  Trajectory moved = poses;
+  for (TimedPose& pose : moved) {
+    glm::vec3& position = pose.world_from_camera.position;
+    position = glm::vec3(glm::dvec3(position) + (origin - scene_origin));
+  }
+  return moved;
 }
 
 }  // namespace catgs

@@ -11,6 +11,11 @@ namespace catgs {
 /// A camera's path as a file describes it.
 struct CameraPath {
   Trajectory poses;
+  glm::dvec3 origin{0.0};  // that the poses are about; the file counts from 0
+
+  /// The poses about the origin of a scene.
+  [[nodiscard]] Trajectory poses_about(const glm::dvec3& scene_origin) const;
+
   // The lens that the whole path was taken with, without its pose; empty where the file says
   // nothing of it.
   std::optional<Camera> lens;
@@ -26,7 +31,8 @@ inline constexpr const char* camera_path_forms =
     "nerfstudio, or a COLMAP folder";
 
 /// Reads a path in any of these forms; the content tells which. Poses without times follow each
-/// other at `rate_hz`: photographs by name, others as the file lists them. Throws InputError.
+/// other at `rate_hz`: photographs by name, others as the file lists them. A path far from 0 is
+/// about an origin near its first pose. Throws InputError.
 CameraPath read_camera_path(const std::filesystem::path& path,
                             double rate_hz = default_pose_rate_hz);
 

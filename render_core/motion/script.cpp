@@ -51,7 +51,8 @@ void check_sampling(double duration_s, double rate_hz) {
   }
 }
 
-PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame) {
+PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame,
+                    const glm::dvec3& origin) {
   constexpr std::string_view tour_prefix = "tour:";
   const std::string_view script = options.script;
   if (script == "orbit") return orbit_script(frame, options.seed);
@@ -68,7 +69,7 @@ PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame) {
       throw InputError("--script", "", "tour: names no file",
                        "tour:FILE, a camera path of keyframes");
     }
-    return tour_script(frame, read_camera_path(file).poses);
+    return tour_script(frame, read_camera_path(file).poses_about(origin));
   }
   throw InputError("--script", "", fmt::format("unknown script \"{}\"", script),
                    "one of orbit, walk, head, drone, still, tour:FILE");
@@ -138,7 +139,8 @@ Trajectory sample(const PoseAt& pose_at, double duration_s, double rate_hz) {
 
 Trajectory make_script(const ScriptOptions& options, const SceneHints& hints) {
   check_sampling(options.duration_s, options.rate_hz);  // a script plans its whole duration
-  return sample(make_pose_at(options, SceneFrame(hints)), options.duration_s, options.rate_hz);
+  return sample(make_pose_at(options, SceneFrame(hints), hints.origin), options.duration_s,
+                options.rate_hz);
 }
 
 }  // namespace catgs

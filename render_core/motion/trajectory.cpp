@@ -34,8 +34,8 @@ std::string_view next_word(std::string_view& rest) {
 
 class LineParser {
  public:
-  LineParser(std::string source, std::size_t line_number)
-      : source_(std::move(source)), where_(fmt::format("line {}", line_number)) {}
+  LineParser(std::string source, std::size_t line_number, const glm::dvec3& origin)
+      : source_(std::move(source)), where_(fmt::format("line {}", line_number)), origin_(origin) {}
 
   /// False for a blank line or a comment.
   bool parse(std::string_view line, TimedPose& pose) const {
@@ -57,7 +57,7 @@ class LineParser {
     pose.time_us = std::llround(value[0] * 1e6);
     for (std::size_t axis = 1; axis <= 3; ++axis)
       if (std::abs(value[axis]) > max_coordinate) fail("the position is out of range");
-    pose.world_from_camera.position = glm::vec3(value[1], value[2], value[3]);
+    pose.world_from_camera.position = glm::vec3(glm::dvec3(value[1], value[2], value[3]) - origin_);
     const glm::dquat rotation(value[7], value[4], value[5], value[6]);
     const double norm = glm::length(rotation);
     if (!(std::abs(norm - 1.0) <= norm_tolerance)) {
@@ -74,18 +74,19 @@ class LineParser {
  private:
   std::string source_;
   std::string where_;
+  glm::dvec3 origin_;
 };
 
 }  // namespace
 
-Trajectory read_tum(const std::filesystem::path& path) {
+Trajectory read_tum(const std::filesystem::path& path, const glm::dvec3& origin) {
   std::ifstream file(path);
   if (!file) throw InputError(path.string(), "", "cannot be opened", "is it a readable file?");
   Trajectory trajectory;
   std::array<char, max_line_bytes> line{};
   for (std::size_t number = 1; file.peek() != std::ifstream::traits_type::eof(); ++number) {
     file.getline(line.data(), line.size());
-    const LineParser parser(path.string(), number);
+    const LineParser parser(path.string(), number, origin);
     if (file.fail()) parser.fail(fmt::format("longer than {} bytes", max_line_bytes - 1));
     TimedPose pose;
     if (!parser.parse(line.data(), pose)) continue;
@@ -102,14 +103,19 @@ Trajectory read_tum(const std::filesystem::path& path) {
   return trajectory;
 }
 
-void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
+               const glm::dvec3& origin) {
   std::string text = fmt::format("# {}\n", tum_format);
   for (const TimedPose& pose : trajectory) {
     const glm::vec3& p = pose.world_from_camera.position;
     const glm::quat& q = pose.world_from_camera.orientation;
-    // fmt prints the shortest decimals that read back as the same float.
-    fmt::format_to(std::back_inserter(text), "{:.6f} {} {} {} {} {} {} {}\n",
-                   static_cast<double>(pose.time_us) * 1e-6, p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+    const glm::dvec3 in_file = glm::dvec3(p) + origin;
+    // fmt prints the shortest decimals that read back as the same number.
+    const std::string place = origin == glm::dvec3(0.0)
+                                  ? fmt::format("{} {} {}", p.x, p.y, p.z)
+                                  : fmt::format("{} {} {}", in_file.x, in_file.y, in_file.z);
+    fmt::format_to(std::back_inserter(text), "{:.6f} {} {} {} {} {}\n",
+                   static_cast<double>(pose.time_us) * 1e-6, place, q.x, q.y, q.z, q.w);
   }
   std::ofstream file(path, std::ios::binary);
   file << text << std::flush;

@@ -18,9 +18,11 @@ struct TimedPose {
 using Trajectory = std::vector<TimedPose>;
 
 /// Reads a TUM file: `timestamp_s tx ty tz qx qy qz qw` on each line, '#' starts a comment.
-/// Quaternions are normalised. Throws InputError with the line of a mistake.
-Trajectory read_tum(const std::filesystem::path& path);
-void write_tum(const std::filesystem::path& path, const Trajectory& trajectory);
+/// Quaternions are normalised. Throws InputError with the line of a mistake. The trajectory is
+/// about `origin`; the file counts from 0.
+Trajectory read_tum(const std::filesystem::path& path, const glm::dvec3& origin = glm::dvec3(0.0));
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
+               const glm::dvec3& origin = glm::dvec3(0.0));
 
 /// Pose at `time_us`: linear in position, slerp in orientation, clamped to the ends. It uses the
 /// sample after `time_us`, so it serves display and resampling, never a forecast.

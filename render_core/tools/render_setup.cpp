@@ -32,7 +32,7 @@ CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
     path.poses = make_script(script_options(options), hints);
   } else {
     path = read_camera_path(options.trace, options.trace_rate_hz);
-    if (options.anchor) path.poses = anchored(path.poses, hints);
+    path.poses = options.anchor ? anchored(path.poses, hints) : path.poses_about(hints.origin);
   }
   return path;
 }

@@ -23,7 +23,7 @@ namespace {
 
 struct WalkFileHeader {
   static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 'w', 'l', 'k'};
-  static constexpr std::uint32_t right_version = 2;
+  static constexpr std::uint32_t right_version = 2, version_with_origin = 3;
 
   std::array<char, 8> magic = right_magic;
   std::uint32_t version = right_version;
@@ -91,13 +91,15 @@ class Reader {
     if (header_.magic != WalkFileHeader::right_magic)
       throw InputError(file_.name(), "magic", "is not that of a .walk file",
                        "catgs-render floors SCENE OUT.walk makes one");
-    if (header_.version != WalkFileHeader::right_version)
+    if (header_.version != WalkFileHeader::right_version &&
+        header_.version != WalkFileHeader::version_with_origin)
       throw InputError(file_.name(), "version", "is not known", "compute it with this version");
     require(header_.checksum == checksum_of(bytes), "checksum", "is wrong");
     read_header();
-    require(header_.packed_bytes == bytes.size() - sizeof header_, "packed bytes",
-            "are not those behind the header");
-    read_tiles(std::span(bytes).subspan(sizeof header_));
+    std::span<const std::byte> rest = std::span(bytes).subspan(sizeof header_);
+    if (header_.version == WalkFileHeader::version_with_origin) rest = read_origin(rest);
+    require(header_.packed_bytes == rest.size(), "packed bytes", "are not those behind the header");
+    read_tiles(rest);
     const glm::ivec2 start(glm::floor(map_.start.place));
     require(map_.clear_at(start, map_.start.height), "start", "is not clear ground");
     return std::move(map_);
@@ -106,6 +108,16 @@ class Reader {
  private:
   void require(bool right, std::string_view field, std::string_view what) const {
     if (!right) throw InputError(file_.name(), field, what, damaged);
+  }
+
+  /// Returns the bytes behind it.
+  std::span<const std::byte> read_origin(std::span<const std::byte> bytes) {
+    require(bytes.size() >= sizeof map_.origin, "origin of the scene", "is cut off");
+    std::memcpy(&map_.origin, bytes.data(), sizeof map_.origin);
+    for (int k = 0; k < 3; ++k)
+      require(std::abs(map_.origin[k]) <= static_cast<double>(max_coordinate),
+              "origin of the scene", "is out of range");
+    return bytes.subspan(sizeof map_.origin);
   }
 
   void read_header() {
@@ -313,6 +325,10 @@ std::string pack(const WalkMap& map) {
   for (std::size_t k = h.storeys; k < map.storeys.size(); ++k)
     h.storey[h.storeys - 1].area += map.storeys[k].area;
   std::string bytes(sizeof h, '\0');
+  if (map.origin != glm::dvec3(0.0)) {
+    h.version = WalkFileHeader::version_with_origin;
+    bytes.append(reinterpret_cast<const char*>(&map.origin), sizeof map.origin);
+  }
   bytes += tiles;
   std::memcpy(bytes.data(), &h, sizeof h);
   h.checksum = checksum_of(std::as_bytes(std::span(bytes)));

@@ -10,7 +10,8 @@
 
 namespace catgs::walk {
 
-// A .walk file: a header of 320 bytes, an index of tiles, and the tiles. All is little-endian. A
+// A .walk file: a header of 320 bytes, the scene's origin in version 3 (three doubles; 0 in version
+// 2), an index of tiles, and the tiles. All is little-endian. A
 // tile has tile_side x tile_side columns, fewer at the map's east and north. Tiles lie row by row,
 // east first, then north. So a client can keep the packed file and unpack what is near. The index
 // has the packed and the unpacked size of each tile, 4 bytes each: 0 and 0 for a tile without

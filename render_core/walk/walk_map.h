@@ -47,13 +47,14 @@ struct Stand {
 /// around it. Places of a column are sorted by height. Two places that are ground are more than a
 /// step apart, and so the neighbour of a place is unique.
 struct WalkMap {
-  Grid grid;
+  Grid grid;  // about `origin`
   Person person;
   Stand start;
   glm::ivec2 size{0};                // columns
   std::vector<std::uint32_t> first;  // size.x * size.y + 1 indices in `places`, row by row
   std::vector<Place> places;
   std::vector<Storey> storeys;  // from below
+  glm::dvec3 origin{0.0};       // of the scene: see scene_origin.h
 
   [[nodiscard]] bool holds(const glm::ivec2& column) const {
     return column.x >= 0 && column.y >= 0 && column.x < size.x && column.y < size.y;

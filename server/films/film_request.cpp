@@ -52,17 +52,17 @@ FilmView read_view(const JsonField& field, const FilmView* before) {
     field.fail("is not [x, y, z, qx, qy, qz, qw, fov_deg]",
                "give fov_deg in the first view; later ones may leave it out, and a whole number "
                "repeats the view before");
-  const auto number = [&](std::size_t i) { return field[i].number(); };
+  const auto number = [&](std::size_t i) { return field[i].precise_number(); };
   FilmView view;
-  view.world_from_camera.position = field.as_place({number(0), number(1), number(2)});
-  view.world_from_camera.orientation =
-      field.as_orientation({number(6), number(3), number(4), number(5)});
+  view.position = {number(0), number(1), number(2)};
+  static_cast<void>(field.as_place(view.position));  // in range
+  view.orientation = glm::quat(field.as_orientation({number(6), number(3), number(4), number(5)}));
   if (count == 7) {
     view.fov_y_rad = before->fov_y_rad;
   } else {
-    if (!(number(7) >= 5.0f && number(7) <= 160.0f))
+    if (!(number(7) >= 5.0 && number(7) <= 160.0))
       field.fail("has a field of view that is not between 5 and 160 degrees");
-    view.fov_y_rad = glm::radians(number(7));
+    view.fov_y_rad = glm::radians(field[7].number());
   }
   return view;
 }

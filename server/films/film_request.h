@@ -13,8 +13,14 @@ namespace catgs {
 enum class FilmKind { picture, panorama, film };
 
 struct FilmView {
-  Pose world_from_camera;
+  glm::dvec3 position{0.0};  // in the coordinates of the scene's file
+  glm::quat orientation{1.0f, 0.0f, 0.0f, 0.0f};
   float fov_y_rad = 1.0f;
+
+  bool operator==(const FilmView&) const = default;
+  [[nodiscard]] Pose pose_about(const glm::dvec3& origin) const {
+    return {glm::vec3(position - origin), orientation};
+  }
 };
 
 /// A picture or a film that an author wants of a scene.

@@ -65,7 +65,7 @@ class Progress {
 
 FrameRequest request_of(const SceneEntry& scene, const FilmView& view, glm::ivec2 size_px) {
   FrameRequest request;
-  request.camera = make_camera(view.world_from_camera, size_px,
+  request.camera = make_camera(view.pose_about(scene.facts.origin), size_px,
                                focal_from_fov_y(view.fov_y_rad, size_px.y), scene.facts.near_z);
   request.background = colour_of(scene.facts.about.background_rgb);
   request.waits_for_pages = true;
@@ -147,12 +147,6 @@ void draw_around(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
   write_png(file.path(), image, {}, [&] { progress.step(); });
 }
 
-bool same(const FilmView& a, const FilmView& b) {
-  return a.world_from_camera.position == b.world_from_camera.position &&
-         a.world_from_camera.orientation == b.world_from_camera.orientation &&
-         a.fov_y_rad == b.fov_y_rad;
-}
-
 void draw_frames(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
                  Progress& progress) {
   const auto video =
@@ -161,7 +155,7 @@ void draw_frames(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
   const std::size_t count = wanted.views.size();
   progress.begin(1.0, count);
   for (std::size_t i = 0; i < count; ++i) {
-    if (!scene.has_view() || !same(wanted.views[i], wanted.views[i - 1]))
+    if (!scene.has_view() || wanted.views[i] != wanted.views[i - 1])
       render(scene, request_of(scene.entry(), wanted.views[i], wanted.size_px), frame);
     video->write(frame);
     if (file.size() > most_film_bytes)

@@ -48,9 +48,9 @@ SceneByParts open(const WalkableAreaSource& source, const std::shared_ptr<Thread
   return by_parts(load_scene(scene, options));
 }
 
-SceneHints hints_of(const WalkableAreaSource& source) {
+SceneHints hints_of(const WalkableAreaSource& source, const glm::dvec3& origin) {
   SceneHints hints;
-  hints.start_pose.position = source.start;
+  hints.start_pose.position = glm::vec3(source.start - origin);
   hints.up = source.up;
   hints.about.metres_per_unit = source.metres_per_unit;
   return hints;
@@ -66,8 +66,9 @@ auto known_of_scene(const Body& body) {
   }
 }
 
-float eye_height_of(const WalkableAreaSource& source, const GaussianCloud& sample) {
-  if (const auto height = walk::eye_height_of(sample, hints_of(source))) return *height;
+float eye_height_of(const WalkableAreaSource& source, const GaussianCloud& sample,
+                    const glm::dvec3& origin) {
+  if (const auto height = walk::eye_height_of(sample, hints_of(source, origin))) return *height;
   throw InputError(spec_of(source), "", "has no floor and ceiling that tell how large people are",
                    "its sidecar can name metres_per_unit");
 }
@@ -77,7 +78,7 @@ float eye_height_of(const WalkableAreaSource& source, const GaussianCloud& sampl
 WalkableAreaSource walkable_area_source(const SceneLocation& scene, const SceneFacts& facts) {
   WalkableAreaSource source;
   source.scene = scene;
-  source.start = facts.start_pose.position;
+  source.start = glm::dvec3(facts.start_pose.position) + facts.origin;
   source.up = facts.up;
   source.metres_per_unit = facts.about.metres_per_unit;
   return source;
@@ -93,24 +94,30 @@ std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
   constexpr std::size_t most_blocks = std::size_t{1} << 21;
   const auto pool = std::make_shared<ThreadPool>(threads);
   std::optional<walk::Occupancy> occupancy;
-  const auto begin = [&](float eye_height) {
-    occupancy.emplace(walk::grid_around(source.start, source.up, eye_height), most_blocks);
+  glm::dvec3 origin(0.0);
+  glm::vec3 start;
+  const auto begin = [&](const GaussianCloud& sample) {
+    const float eye_height = eye_height_of(source, sample, origin);
+    start = glm::vec3(source.start - origin);
+    occupancy.emplace(walk::grid_around(start, source.up, eye_height), most_blocks);
   };
   const auto take = [&](const GaussianCloud& part) {
     known_of_scene([&] { occupancy->add(part, *pool, progress); });
   };
   const std::string spec = spec_of(source);
   if (is_synthetic(spec)) {
-    begin(eye_height_of(source, {}));  // it has a unit
+    begin({});  // it has a unit
     synthesize_parts(spec, *pool, take);
   } else {
     const SceneByParts scene = open(source, pool, progress);
-    begin(known_of_scene([&] { return eye_height_of(source, *scene.sample); }));
+    origin = scene.hints.origin;
+    known_of_scene([&] { begin(*scene.sample); });
     scene.each(take);
   }
-  return walk::pack(known_of_scene([&] {
-    return walk::find_walkable_area(*occupancy, {}, source.start, spec, *pool, progress);
-  }));
+  walk::WalkMap map = known_of_scene(
+      [&] { return walk::find_walkable_area(*occupancy, {}, start, spec, *pool, progress); });
+  map.origin = origin;
+  return walk::pack(map);
 }
 
 std::string walkable_area_name(const WalkableAreaSource& source) {

@@ -18,7 +18,8 @@ struct WalkableAreaSource {
   std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
   LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
   std::filesystem::path beside;  // a .walk file of the author's; empty: nowhere
-  glm::vec3 start, up;           // of the scene as it is shown
+  glm::dvec3 start{0.0};         // where visits begin, in the coordinates of the scene's file
+  glm::vec3 up{0.0f};            // of the scene as it is shown
   float metres_per_unit = 0.0f;  // 0: not said
 };
 WalkableAreaSource walkable_area_source(const SceneLocation& scene, const SceneFacts& facts);

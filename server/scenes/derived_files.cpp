@@ -114,14 +114,15 @@ std::string derived_name(const SceneLocation& scene, const std::string& facts,
 }
 
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
+  constexpr int reading = 2;  // version of how scenes are read
   const std::optional<SplatModel> model = model_in_sidecar(scene.hints);
   try {
     const Content content = content_of(scene);
     const std::string facts =
-        fmt::format("{}\n{} {} {}\n{} {}\n{} {}", scene.files.path.string(), content.files,
+        fmt::format("{}\n{} {} {}\n{} {}\n{} {} {}", scene.files.path.string(), content.files,
                     content.bytes, content.newest.time_since_epoch().count(),
                     levels.lod.value_or(-1), levels.gaussian_budget.value_or(0),
-                    TreeHeader::right_version, model ? name_of(*model) : "");
+                    TreeHeader::right_version, reading, model ? name_of(*model) : "");
     return derived_name(scene, facts, tree_extension);
   } catch (const fs::filesystem_error& error) {
     throw InputError(scene.given.string(), {}, "cannot be read: " + error.code().message());

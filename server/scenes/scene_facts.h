@@ -18,6 +18,7 @@ inline void use_hints(const SceneHints& hints, const std::string& name, SceneFac
   facts.limits_max = hints.limits.max;
   facts.near_z = hints.near_z;
   facts.scale = hints.scale;
+  facts.origin = hints.origin;
   facts.about = hints.about;
 }
 
@@ -30,6 +31,7 @@ inline SceneHints hints_of(const SceneFacts& facts) {
   hints.limits = {facts.limits_min, facts.limits_max};
   hints.near_z = facts.near_z;
   hints.scale = facts.scale;
+  hints.origin = facts.origin;
   hints.about = facts.about;
   return hints;
 }

@@ -81,6 +81,9 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   const bool still_wanted = record && record->entry && record->entry->renderer == before &&
                             record->found.tree == found.tree && !record->outdated;
   if (!still_wanted) return loader_.free_later(std::move(loaded.entry));
+  // Visitors' places are about the origin that their welcome named.
+  if (loaded.entry->facts.origin != record->entry->facts.origin)
+    return trees_.give_up(found, "it has another origin than the scene in memory");
   residency_.resize(id, need_of(*record->entry).with(need_of(*loaded.entry)));
   record->former = std::exchange(record->entry, redrawn(*record->entry, *loaded.entry));
   record->tree_lost = false;

@@ -32,8 +32,10 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   return scene;
 }
 
-Sidecar sidecar_in(const std::filesystem::path& file, std::string_view text) {
-  return read_sidecar(MemorySource(file.string(), std::as_bytes(std::span(text))));
+/// The sidecar of an entry, with this content.
+Sidecar sidecar_of(const SceneEntry& entry, std::string_view text) {
+  return read_sidecar(MemorySource(entry.sidecar.string(), std::as_bytes(std::span(text))),
+                      entry.facts.origin);
 }
 
 HttpResponse tagged(int status, std::string text, std::string etag) {
@@ -95,8 +97,8 @@ SidecarSaver::Outcome SidecarSaver::refuse_outdated(const Request& request,
   Outcome refused{tagged(412, "412: somebody else saved this scene since you opened it\n", tag)};
   try {
     if (tag != scene.sidecar_tag)
-      refused.revised = revised(scene, there ? sidecar_in(scene.sidecar, *there) : Sidecar(), there,
-                                media_origins_);
+      refused.revised =
+          revised(scene, there ? sidecar_of(scene, *there) : Sidecar(), there, media_origins_);
   } catch (const InputError& broken) {
     log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
                 "scene {}: stays as it was: {}", request.scene_id, broken.what());
@@ -109,7 +111,7 @@ SidecarSaver::Outcome SidecarSaver::write(const Request& request) const {
   const std::filesystem::path& file = scene.sidecar;
   Sidecar sidecar;
   try {
-    sidecar = check_sent_sidecar(request.json, media_origins_);
+    sidecar = check_sent_sidecar(request.json, media_origins_, scene.facts.origin);
   } catch (const InputError& mistake) {
     return {text_response(400, fmt::format("400: {}\n", mistake.what()))};
   }

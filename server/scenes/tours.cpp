@@ -62,10 +62,11 @@ nlohmann::json viewer_settings(const std::filesystem::path& sidecar) {
 
 }  // namespace
 
-Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins) {
+Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins,
+                           const glm::dvec3& origin) {
   const MemorySource source("sidecar", std::as_bytes(std::span(json)));
   const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
-  Sidecar sidecar = read_sidecar(source);
+  Sidecar sidecar = read_sidecar(source, origin);
   if (sidecar.unknown) throw InputError(source.name(), "", *sidecar.unknown);
   check_tours(JsonField(source.name(), document), &media_origins);
   return sidecar;

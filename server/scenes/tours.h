@@ -45,8 +45,10 @@ struct ToursAnswers {
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
 
 /// Checks a sidecar sent by an author. It is stricter than for operators' files: every field must
-/// be known, and check_tours() finds no mistake. Throws InputError that names the field.
-Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins = {});
+/// be known, and check_tours() finds no mistake. Throws InputError that names the field. Its places
+/// are returned about `origin`.
+Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins = {},
+                           const glm::dvec3& origin = glm::dvec3(0.0));
 
 /// The size limit of check_sent_sidecar(): 32 tours of 256 stops with short captions.
 inline constexpr std::size_t max_sent_sidecar_bytes = 1 << 20;

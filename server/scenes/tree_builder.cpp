@@ -23,7 +23,7 @@ void build_whole(const TreeBuild& build, const std::shared_ptr<ThreadPool>& pool
                            take(scene.cloud);
                            return std::uint64_t{scene.report.dropped};
                          },
-                         scene.format, true};
+                         scene.format, true, scene.hints.origin};
   build_tree(whole, build.out, build.memory_bytes, *pool,
              LoadContext(*pool, progress).part(loaded, 1.0));
 }

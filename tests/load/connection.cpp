@@ -28,6 +28,7 @@ SceneHints hints_of(const v1::SceneFacts& scene) {
   hints.near_z = scene.near_z();
   hints.limits = {from_wire(scene.limits_min()), from_wire(scene.limits_max())};
   hints.focus = from_wire(scene.focus());
+  hints.origin = {scene.origin().x(), scene.origin().y(), scene.origin().z()};
   hints.source = "server";
   return hints;
 }

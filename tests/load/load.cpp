@@ -38,7 +38,7 @@ class TrajectoryMaker {
                        "--script head plays recorded-like head motion");
     }
     for (const std::string& path : options.traces)
-      traces_.push_back(std::make_shared<const Trajectory>(read_camera_path(path).poses));
+      traces_.push_back(std::make_shared<const CameraPath>(read_camera_path(path)));
     // A wrong script fails now, not in each session.
     if (traces_.empty()) (void)make(0, SceneHints());
   }
@@ -54,14 +54,15 @@ class TrajectoryMaker {
       return std::make_shared<const Trajectory>(make_script(script, scene));
     }
     const auto& trace = traces_[static_cast<std::size_t>(session) % traces_.size()];
-    if (!options_.anchor) return trace;
-    return std::make_shared<const Trajectory>(anchored(*trace, scene));
+    if (options_.anchor) return std::make_shared<const Trajectory>(anchored(trace->poses, scene));
+    if (trace->origin == scene.origin) return {trace, &trace->poses};
+    return std::make_shared<const Trajectory>(trace->poses_about(scene.origin));
   }
 
  private:
   const GroupOptions& options_;
   double duration_s_;
-  std::vector<std::shared_ptr<const Trajectory>> traces_;
+  std::vector<std::shared_ptr<const CameraPath>> traces_;
 };
 
 void check(const GroupOptions& group, double duration_s) {

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import {
+  add,
   axis_angle,
   cross,
   dot,
@@ -150,14 +151,22 @@ describe('same view', () => {
       position: pose.position.map(Math.fround) as unknown as Vec3,
       orientation: [x, y, z, w].map((v) => -Math.fround(v)) as unknown as Quat,
     };
-    expect(same_view(rounded, pose, 0.2)).toBe(true);
+    expect(same_view(rounded, pose, { near_z: 0.2 })).toBe(true);
+  });
+
+  it('is as exact in a scene far from 0 as in one near it', () => {
+    const origin: Vec3 = [500123, 5412345, 431];
+    const far = { ...at, position: add(at.position, origin) };
+    const moved = { ...far, position: add(far.position, [0, 1e-4, 0]) };
+    expect(same_view(far, far, { near_z: 0.2, origin })).toBe(true);
+    expect(same_view(moved, far, { near_z: 0.2, origin })).toBe(false);
   });
 
   it('ends where a movement can be seen', () => {
     const turned = { ...at, orientation: axis_angle(right, 1e-4) };
     const moved = { ...at, position: [0, 1e-4, -5] as const };
-    expect(same_view(turned, at, 0.2)).toBe(false);
-    expect(same_view(moved, at, 0.2)).toBe(false);
+    expect(same_view(turned, at, { near_z: 0.2 })).toBe(false);
+    expect(same_view(moved, at, { near_z: 0.2 })).toBe(false);
   });
 });
 

@@ -246,6 +246,13 @@ describe('a shared link', () => {
     expect(shared.eye!.fov_y_rad).toBeCloseTo(1, 4);
   });
 
+  it('keeps its digits far from 0', () => {
+    const far = { ...eye, position: [500123.4321, 5412345.3123, -431.2] as const };
+    const nowhere = { mode: undefined, tour_index: undefined, stop_index: undefined };
+    const address = share_address('https://host/', 'city', { eye: far, ...nowhere });
+    expect_vec(read_shared(address).eye!.position, far.position, 4);
+  });
+
   it.each(['', '1,2,3', '1,2,3,0,0,0,9,60', '1,2,x,0,0,0,1,60', '1,2,3,0,0,0,1,999', ',,,,,,,'])(
     'with nonsense "%s" leads nowhere',
     (at) => {

@@ -1,5 +1,6 @@
 // The client's reader, walker and paths against those of render_core/walk (walk_golden_test.cpp).
 import { describe, expect, it } from 'vitest';
+import { sub, type Vec3 } from '#client/base/vector';
 import { find_path } from '#client/walk/path';
 import { tiles_in } from '#client/walk/tiles';
 import {
@@ -42,6 +43,19 @@ describe('a walk file', () => {
     expect(map.storeys).toHaveLength(2);
     expect(storey_at(map, stand(golden.below[1]!.stand).height)).toBe(1);
     expect(is_clear(map, map.start)).toBe(true);
+  });
+
+  it('lies in the coordinates of a file far from 0', async () => {
+    const origin: Vec3 = [500123, 5412345, 431];
+    const far = new Uint8Array(file.length + 24);
+    far.set(file.subarray(0, 320));
+    far.set(file.subarray(320), 344);
+    const view = new DataView(far.buffer);
+    view.setUint32(8, 3, true);
+    origin.forEach((v, k) => view.setFloat64(320 + 8 * k, v, true));
+    const there = await read_walk_file(seal(far));
+    expect_vec(sub(there.origin, map.origin), origin, 6);
+    expect(is_clear(there, there.start)).toBe(true);
   });
 
   it('is refused where it is cut off or changed', async () => {

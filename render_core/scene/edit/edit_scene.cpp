@@ -17,6 +17,7 @@
 #include "render_core/scene/edit/remove_floaters.h"
 #include "render_core/scene/keep_if.h"
 #include "render_core/scene/prune.h"
+#include "render_core/scene/scene_origin.h"
 
 namespace catgs {
 namespace {
@@ -53,10 +54,11 @@ void place_cloud(GaussianCloud& cloud, const Placement& placement, ThreadPool& p
   if (!fits) fail_out_of_range("a Gaussian");
 }
 
-void crop(GaussianCloud& cloud, const Bounds& box) {
+void crop(GaussianCloud& cloud, const CropBox& box) {
   keep_if(cloud, [&](std::size_t i) {
-    return glm::all(glm::greaterThanEqual(cloud.mean[i], box.min)) &&
-           glm::all(glm::lessThanEqual(cloud.mean[i], box.max));
+    const glm::dvec3 mean(cloud.mean[i]);
+    return glm::all(glm::greaterThanEqual(mean, box.min)) &&
+           glm::all(glm::lessThanEqual(mean, box.max));
   });
 }
 
@@ -73,6 +75,21 @@ bool Placement::moves() const {
 }
 
 AffineMap Placement::map() const { return {scale * glm::mat3_cast(rotation), offset}; }
+
+EditAboutOrigin about_origin(const SceneEdit& edit, const glm::dvec3& origin) {
+  EditAboutOrigin about{edit, origin};
+  if (edit.placement.moves()) {
+    const glm::dvec3 moved = edit.placement.map()(origin);
+    if (!in_range(glm::vec3(moved))) fail_out_of_range("the origin of the scene");
+    about.origin = origin_near(moved);
+    about.edit.placement.offset = moved - about.origin;
+  }
+  if (about.edit.crop) {
+    about.edit.crop->min -= about.origin;
+    about.edit.crop->max -= about.origin;
+  }
+  return about;
+}
 
 EditCounts edit_cloud(GaussianCloud& cloud, const SceneEdit& edit, ThreadPool& pool,
                       const LoadContext& context) {

@@ -24,10 +24,14 @@ struct Placement {
   [[nodiscard]] AffineMap map() const;
 };
 
+struct CropBox {
+  glm::dvec3 min{0.0}, max{0.0};
+};
+
 /// The steps that edit a scene, in this order. With its defaults it changes nothing.
 struct SceneEdit {
   Placement placement{};
-  std::optional<Bounds> crop{};  // keeps the Gaussians whose means lie in it, after the placement
+  std::optional<CropBox> crop{};  // keeps the Gaussians whose means lie in it, once placed
   bool remove_floaters = false;
   double keep_fraction = 1.0;  // in (0, 1]; see keep_most_important()
   // Gaussians that are left by merging: the smaller of a number (0: no limit) and a share in (0,
@@ -41,6 +45,14 @@ struct SceneEdit {
   }
 };
 
+/// The same edit of places that are about an origin, and the origin that they are about afterwards.
+struct EditAboutOrigin {
+  SceneEdit edit;
+  glm::dvec3 origin{0.0};
+};
+/// Throws InputError where the placement leads beyond max_coordinate.
+EditAboutOrigin about_origin(const SceneEdit& edit, const glm::dvec3& origin);
+
 /// How many Gaussians each step has taken away.
 struct EditCounts {
   std::size_t cropped = 0, floaters = 0, pruned = 0, merged = 0;
@@ -51,8 +63,8 @@ struct EditCounts {
 EditCounts edit_cloud(GaussianCloud& cloud, const SceneEdit& edit, ThreadPool& pool,
                       const LoadContext& context);
 
-/// The hints of a scene that has been placed. Limits become the box around the turned box. Throws
-/// InputError where they lead beyond max_coordinate.
+/// The hints of a scene that has been placed, about the same origin. Limits become the box around
+/// the turned box. Throws InputError where they lead beyond max_coordinate.
 SceneHints placed(const SceneHints& hints, const Placement& placement);
 
 }  // namespace catgs

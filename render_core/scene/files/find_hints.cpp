@@ -30,7 +30,7 @@ CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes)
     if (path.empty() || !std::filesystem::is_regular_file(path, error)) return {};
     try {
       CameraFile found{path.filename().string(), {}};
-      for (const ListedCamera& listed : read_camera_json(FileSource(path)).cameras)
+      for (const ListedCamera& listed : read_camera_json(FileSource(path), files.origin).cameras)
         found.poses.push_back(listed.camera.world_from_camera);
       return found;
     } catch (const InputError& e) {
@@ -96,10 +96,11 @@ void use_orbit(const OrbitLimits& orbit, SceneHints& hints) {
   hints.source += ", with the orbit of its file";
 }
 
-std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
+std::optional<Sidecar> sidecar_at(const HintFiles& files) {
   std::error_code error;
-  if (path.empty() || !std::filesystem::is_regular_file(path, error)) return std::nullopt;
-  return read_sidecar(FileSource(path));
+  if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error))
+    return std::nullopt;
+  return read_sidecar(FileSource(files.sidecar), files.origin);
 }
 
 }  // namespace
@@ -114,7 +115,7 @@ bool tell_anything(const HintFiles& files) {
 }
 
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files) {
-  const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);
+  const std::optional<Sidecar> sidecar = sidecar_at(files);
   return sidecar ? sidecar->model : std::nullopt;
 }
 
@@ -128,7 +129,7 @@ void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, 
 SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
                       std::shared_ptr<ThreadPool> pool) {
-  const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);
+  const std::optional<Sidecar> sidecar = sidecar_at(files);
   if (sidecar && sidecar->unknown)
     notes.push_back(
         fmt::format("{}: {} is ignored", files.sidecar.filename().string(), *sidecar->unknown));
@@ -143,6 +144,7 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
   else if (files.orbit)
     use_orbit(*files.orbit, hints);
   if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
+  hints.origin = files.origin;
   return hints;
 }
 

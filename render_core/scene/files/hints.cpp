@@ -34,23 +34,23 @@ glm::vec3 parse_up(const JsonField& field) {
   return glm::normalize(up);
 }
 
-Sidecar::StartPose parse_start_pose(const JsonField& field) {
+Sidecar::StartPose parse_start_pose(const JsonField& field, const glm::dvec3& origin) {
   Sidecar::StartPose pose;
-  pose.position = field.at("position").place();
+  pose.position = field.at("position").place(origin);
   if (const auto target = field.find("look_at")) {
     if (field.find("orientation")) field.fail("has both 'look_at' and 'orientation'", "keep one");
-    pose.look_at = target->place();
+    pose.look_at = target->place(origin);
     if (*pose.look_at == pose.position) target->fail("is the position itself");
   } else if (const auto orientation = field.find("orientation")) {
-    pose.orientation = orientation->orientation();
+    pose.orientation = glm::quat(orientation->orientation());
   } else {
     field.fail("'look_at' or 'orientation' is missing", "a place, or a quaternion x, y, z, w");
   }
   return pose;
 }
 
-Bounds parse_limits(const JsonField& field) {
-  const Bounds limits{field.at("min").place(), field.at("max").place()};
+Bounds parse_limits(const JsonField& field, const glm::dvec3& origin) {
+  const Bounds limits{field.at("min").place(origin), field.at("max").place(origin)};
   for (int k = 0; k < 3; ++k)
     if (!(limits.min[k] < limits.max[k])) field.fail("'min' is not below 'max' on every axis");
   return limits;
@@ -95,7 +95,7 @@ SceneAbout parse_about(const JsonField& root) {
 
 }  // namespace
 
-Sidecar read_sidecar(const ByteSource& file) {
+Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin) {
   const nlohmann::json document = read_json(file, max_sidecar_bytes);
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
@@ -108,15 +108,16 @@ Sidecar read_sidecar(const ByteSource& file) {
       sidecar.unknown =
           fmt::format("unknown field '{}' (known are {})", key, fmt::join(known, ", "));
   if (const auto up = root.find("up")) sidecar.up = parse_up(*up);
-  if (const auto pose = root.find("start_pose")) sidecar.start_pose = parse_start_pose(*pose);
+  if (const auto pose = root.find("start_pose"))
+    sidecar.start_pose = parse_start_pose(*pose, origin);
   if (const auto near = root.find("near")) {
     sidecar.near_z = near->number();
     if (*sidecar.near_z <= 0.0f) near->fail("is not positive");
     if (*sidecar.near_z > max_coordinate)
       near->fail(fmt::format("is beyond {} units", max_coordinate));
   }
-  if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits);
-  if (const auto focus = root.find("focus")) sidecar.focus = focus->place();
+  if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits, origin);
+  if (const auto focus = root.find("focus")) sidecar.focus = focus->place(origin);
   sidecar.about = parse_about(root);
   if (const auto model = root.find("model")) {
     sidecar.model = splat_model_named(model->text());
@@ -140,21 +141,35 @@ void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hi
   hints.source = fmt::format("sidecar {}", name);
 }
 
+void note_origin(const glm::dvec3& origin, std::vector<std::string>& notes) {
+  if (origin != glm::dvec3(0.0))
+    notes.push_back(fmt::format(
+        "its origin is [{}, {}, {}] of the file, because floats round places so far from 0; "
+        "sidecars, cameras and pages count from 0 as the file does",
+        origin.x, origin.y, origin.z));
+}
+
+nlohmann::ordered_json json_place(const glm::vec3& place, const glm::dvec3& origin) {
+  if (origin == glm::dvec3(0.0)) return {place.x, place.y, place.z};
+  const glm::dvec3 in_file = glm::dvec3(place) + origin;
+  return {in_file.x, in_file.y, in_file.z};
+}
+
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
   return std::filesystem::path(scene_file).replace_extension(".json");
 }
 
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
                    const nlohmann::ordered_json* tours) {
-  const auto triple = [](const glm::vec3& v) { return nlohmann::ordered_json{v.x, v.y, v.z}; };
+  const auto place = [&](const glm::vec3& p) { return json_place(p, hints.origin); };
   const glm::quat& q = hints.start_pose.orientation;
   nlohmann::ordered_json document = {
-      {"up", triple(hints.up)},
+      {"up", {hints.up.x, hints.up.y, hints.up.z}},
       {"start_pose",
-       {{"position", triple(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
+       {{"position", place(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
       {"near", hints.near_z},
-      {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}},
-      {"focus", triple(hints.focus)}};
+      {"limits", {{"min", place(hints.limits.min)}, {"max", place(hints.limits.max)}}},
+      {"focus", place(hints.focus)}};
   const SceneAbout& about = hints.about;
   const auto add_said = [&](const char* name, const std::string& text) {
     if (!text.empty()) document[name] = text;

@@ -51,8 +51,8 @@ struct Sidecar {
 };
 
 /// Throws InputError naming the field. An unknown field is no error, because a newer version or
-/// another program may know it.
-Sidecar read_sidecar(const ByteSource& file);
+/// another program may know it. Places are returned about `origin`.
+Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin = glm::dvec3(0.0));
 
 /// Overwrites hints with the sidecar's fields; `about` is the sidecar's as a whole. `name`: name of
 /// the sidecar's file.
@@ -72,10 +72,17 @@ struct HintFiles {
   std::filesystem::path cameras;
   std::filesystem::path transforms;
   std::optional<OrbitLimits> orbit{};  // of the scene's file
+  glm::dvec3 origin{0.0};              // of the scene; the files count from 0
 };
 
 /// Whether they tell anything: a file is there, or an orbit.
 bool tell_anything(const HintFiles& files);
+
+/// Notes where an origin other than 0 is.
+void note_origin(const glm::dvec3& origin, std::vector<std::string>& notes);
+
+/// A place about `origin`, as the files beside a scene have it.
+nlohmann::ordered_json json_place(const glm::vec3& place, const glm::dvec3& origin);
 
 /// The model that the sidecar names, if any. Throws InputError for a faulty sidecar.
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files);

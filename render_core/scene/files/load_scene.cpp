@@ -21,10 +21,11 @@ DecodedScene read_location(const SceneLocation& location, const LoadOptions& opt
                            const LoadContext& context) {
   const SceneFormat& format = *location.format;
   if (!location.has_levels()) return format.read(location.files, context);
-  OpenLevels scene = format.open_levels(location.files.open(), location.files.index, options.lod,
-                                        options.gaussian_budget, max_gaussians);
-  GaussianCloud cloud = read_levels(scene, context);
-  return {std::move(scene.format), std::move(cloud), std::move(scene.notes)};
+  const OpenLevels scene = format.open_levels(location.files.open(), location.files.index,
+                                              options.lod, options.gaussian_budget, max_gaussians);
+  return read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+    return {scene.format, read_levels(scene, context, origin), scene.notes};
+  });
 }
 
 }  // namespace
@@ -48,6 +49,12 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
   scene.notes = std::move(decoded.notes);
   HintFiles hints = location.hints;
   hints.orbit = decoded.orbit;
+  hints.origin = decoded.origin;
+  if (!location.is_in_pages()) {  // whose pages are about the origin that their header has
+    const glm::dvec3 left = find_origin(scene.cloud.mean);
+    move_origin(scene.cloud, left);
+    hints.origin += left;
+  }
   // Surfels of a tree are flat already, and their axes are in another order.
   const bool is_flat = location.is_in_pages() && scene.cloud.model == SplatModel::surfels;
   use_model(hints, options.model, scene.cloud.model, scene.notes);
@@ -58,6 +65,8 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
   if (options.first_view || tell_anything(hints))
     scene.hints = find_hints(scene.cloud, hints, options.up, scene.notes, pool);
+  scene.hints.origin = hints.origin;
+  note_origin(hints.origin, scene.notes);
   context.report(1.0);
   return scene;
 }
@@ -89,8 +98,11 @@ SceneInPages open_in_pages(const std::filesystem::path& tree, const SceneLocatio
   scene.outline.notes.insert(scene.outline.notes.end(), outline.notes.begin(), outline.notes.end());
   const TreeHeader& header = scene.tree->header();
   scene.outline.report = {.read = header.read, .dropped = header.dropped};
+  HintFiles hints = made_of.hints;
+  hints.origin = header.origin;
   scene.outline.hints =
-      find_hints(scene.outline.cloud, made_of.hints, options.up, scene.outline.notes, pool);
+      find_hints(scene.outline.cloud, hints, options.up, scene.outline.notes, pool);
+  note_origin(hints.origin, scene.outline.notes);
   context.report(1.0);
   return scene;
 }

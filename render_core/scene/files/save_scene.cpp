@@ -44,13 +44,19 @@ std::vector<std::string> losses_of(const GaussianCloud& cloud, const std::filesy
   }
 }
 
-void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads) {
+bool keeps_origin(const std::filesystem::path& path) {
+  const SceneFormat* format = format_with(path.extension().string());
+  return format != nullptr && format->keeps_origin;
+}
+
+void save_scene(const GaussianCloud& cloud, const std::filesystem::path& path, int threads,
+                const glm::dvec3& origin) {
   assert(cloud.sizes_agree());
   const SceneFormat& format = format_to_write(path);
   ThreadPool pool(threads);
   PartFile file(path);
   try {
-    format.write(cloud, pool, file.stream());
+    format.write(cloud, origin, pool, file.stream());
   } catch (const InputError& e) {  // the writers do not know the file's name
     throw InputError(path.string(), "", e.what());
   }

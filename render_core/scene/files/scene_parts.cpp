@@ -22,8 +22,14 @@ std::optional<DecodedParts> levels_in_parts(const SceneLocation& location,
   };
   const OpenLevels scene = open(std::nullopt, TreeShape::max_gaussians);
   if (scene.levels == 1) return std::nullopt;
-  DecodedParts parts{scene.format, scene.parts, scene.read,
-                     read_levels(open(scene.levels - 1, max_gaussians), context), scene.notes};
+  const OpenLevels coarsest = open(scene.levels - 1, max_gaussians);
+  DecodedScene sample = read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+    return {.format = {}, .cloud = read_levels(coarsest, context, origin)};
+  });
+  DecodedParts parts{scene.format, scene.parts,  {}, std::move(sample.cloud),
+                     scene.notes,  sample.origin};
+  parts.read = [read = scene.read, origin = sample.origin](
+                   std::uint64_t part, const auto& reading) { return read(part, origin, reading); };
   const std::size_t step =
       (parts.sample.size() + DecodedParts::most_sampled - 1) / DecodedParts::most_sampled;
   keep_if(parts.sample, [&](std::size_t i) { return i % step == 0; });
@@ -53,8 +59,12 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
+  HintFiles hints = location.hints;
+  hints.origin = parts->origin;
   if (wants_hints && !sample.empty())
-    scene.hints = find_hints(sample, location.hints, options.up, scene.notes, pool);
+    scene.hints = find_hints(sample, hints, options.up, scene.notes, pool);
+  scene.hints.origin = scene.parts.origin = parts->origin;
+  note_origin(parts->origin, scene.notes);
   scene.parts.format = parts->format;
   scene.parts.each = [read = parts->read, count = parts->count, used = sample.model, reach,
                       pool](const auto& take) {

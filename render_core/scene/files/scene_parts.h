@@ -17,7 +17,8 @@ namespace catgs {
 struct PartedScene {
   SceneParts parts;                // as load_scene() has them; they keep the file open
   GaussianCloud sample;            // an even sample of at most 2^16
-  SceneHints hints;                // as load_scene() finds them, from the sample; if wanted
+  SceneHints hints;                // as load_scene() finds them, from the sample; if wanted; the
+                                   // origin in any case
   std::vector<std::string> notes;  // as Scene::notes
 };
 

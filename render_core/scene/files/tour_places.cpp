@@ -24,23 +24,22 @@ bool are_numbers(const nlohmann::ordered_json& value, std::size_t count) {
 }
 
 void place_member(const std::string& name, nlohmann::ordered_json& value,
-                  const Placement& placement) {
+                  const Placement& placement, const glm::dvec3& origin) {
   const auto number = [&](std::size_t k) { return value[k].get<double>(); };
   const bool is_place = name == "position" || name == "look_at" || name == "marker";
-  // As floats, which sidecars hold.
   if (is_place && are_numbers(value, 3)) {
-    const glm::vec3 to(placement.map()({number(0), number(1), number(2)}));
+    const glm::dvec3 to = placement.map()({number(0), number(1), number(2)});
     for (int k = 0; k < 3; ++k)
-      if (!(std::abs(to[k]) <= max_coordinate))
+      if (!(std::abs(to[k]) <= static_cast<double>(max_coordinate)))
         throw InputError("placement", "",
                          fmt::format("a place of a tour would lie beyond {} units", max_coordinate),
                          "scale less, or move less far");
-    value = {to.x, to.y, to.z};
+    value = json_place(glm::vec3(to - origin), origin);
   } else if (name == "orientation" && are_numbers(value, 4)) {
     const glm::quat to(placement.rotation * glm::dquat(number(3), number(0), number(1), number(2)));
     value = {to.x, to.y, to.z, to.w};
-  } else {
-    place_tours(value, placement);
+  } else if (name != "portal") {
+    place_tours(value, placement, origin);
   }
 }
 
@@ -54,11 +53,12 @@ nlohmann::ordered_json tours_in_sidecar(const HintFiles& files) {
   return tours == document.end() ? nlohmann::ordered_json() : nlohmann::ordered_json(*tours);
 }
 
-void place_tours(nlohmann::ordered_json& tours, const Placement& placement) {
+void place_tours(nlohmann::ordered_json& tours, const Placement& placement,
+                 const glm::dvec3& origin) {
   if (tours.is_object()) {
-    for (auto&& [name, value] : tours.items()) place_member(name, value, placement);
+    for (auto&& [name, value] : tours.items()) place_member(name, value, placement, origin);
   } else if (tours.is_array()) {
-    for (auto& value : tours) place_tours(value, placement);
+    for (auto& value : tours) place_tours(value, placement, origin);
   }
 }
 

@@ -12,7 +12,9 @@ namespace catgs {
 nlohmann::ordered_json tours_in_sidecar(const HintFiles& files);
 
 /// Places all that lies in the scene: members "position", "look_at" and "marker" of three numbers,
-/// and "orientation" of four, at any depth. Everything else stays, known or not.
-void place_tours(nlohmann::ordered_json& tours, const Placement& placement);
+/// and "orientation" of four, at any depth. Everything else stays, known or not, and so do the
+/// places of portals, which are in other scenes. `origin`: of the placed scene.
+void place_tours(nlohmann::ordered_json& tours, const Placement& placement,
+                 const glm::dvec3& origin = glm::dvec3(0.0));
 
 }  // namespace catgs

@@ -27,8 +27,8 @@ glm::quat orientation_of(const JsonField& field, const glm::mat3& rotation) {
 }
 
 /// A 3DGS training's camera: position, and a 3x3 matrix from our camera axes.
-Pose training_pose(const JsonField& camera) {
-  const glm::vec3 position = camera.at("position").place();
+Pose training_pose(const JsonField& camera, const glm::dvec3& origin) {
+  const glm::vec3 position = camera.at("position").place(origin);
   const JsonField rows = camera.at("rotation");
   if (rows.size() != 3) rows.fail("is not a 3x3 matrix");
   glm::mat3 rotation;
@@ -40,25 +40,26 @@ Pose training_pose(const JsonField& camera) {
 }
 
 /// A world-from-camera matrix of OpenGL axes (y up, z back): 3 or 4 rows, or 16 numbers by rows.
-Pose opengl_pose(const JsonField& matrix) {
-  std::vector<float> m;
+Pose opengl_pose(const JsonField& matrix, const glm::dvec3& origin) {
+  std::vector<double> m;
   if (matrix.size() == 16) {
-    m = matrix.numbers(16);
+    const auto numbers = matrix.doubles<16>();
+    m.assign(numbers.begin(), numbers.end());
   } else {
     if (matrix.size() != 3 && matrix.size() != 4) matrix.fail("is not a 4x4 matrix");
     for (std::size_t r = 0; r < 3; ++r) {
-      const std::vector<float> row = matrix[r].numbers(4);
+      const auto row = matrix[r].doubles<4>();
       m.insert(m.end(), row.begin(), row.end());
     }
   }
-  glm::mat3 rotation;
-  glm::vec3 position;
+  glm::dmat3 rotation;
+  glm::dvec3 position;
   for (int r = 0; r < 3; ++r) {
-    const float* row = m.data() + static_cast<std::size_t>(r) * 4;
+    const double* row = m.data() + static_cast<std::size_t>(r) * 4;
     for (int c = 0; c < 3; ++c) rotation[c][r] = c == 0 ? row[c] : -row[c];
     position[r] = row[3];
   }
-  return {matrix.as_place(position), orientation_of(matrix, rotation)};
+  return {matrix.as_place(position, origin), orientation_of(matrix, glm::mat3(rotation))};
 }
 
 /// A positive number of a camera, or of all cameras of the file; 0 where there is none.
@@ -95,19 +96,19 @@ std::string name_of(const JsonField& camera, std::string_view key) {
   return name && name->value().is_string() ? name->text() : std::string();
 }
 
-CameraList read_array(const JsonField& all) {
+CameraList read_array(const JsonField& all, const glm::dvec3& origin) {
   CameraList list;
   for (std::size_t i = 0; i < all.size(); ++i) {
     const JsonField item = all[i];
     ListedCamera& listed = list.cameras.emplace_back();
     if (const auto matrix = item.find("transform")) {
       listed.name = name_of(item, "file_path");
-      listed.camera.world_from_camera = opengl_pose(*matrix);
+      listed.camera.world_from_camera = opengl_pose(*matrix, origin);
       continue;
     }
     const auto number = [&](std::string_view key) { return positive(item, item, key); };
     listed.name = name_of(item, "img_name");
-    listed.camera.world_from_camera = training_pose(item);
+    listed.camera.world_from_camera = training_pose(item, origin);
     set_lens({number("width"), number("height")}, {number("fx"), number("fy")}, {}, listed.camera);
   }
   // A training writes its test views first. The names of a video's frames are in order of time.
@@ -116,7 +117,7 @@ CameraList read_array(const JsonField& all) {
   return list;
 }
 
-CameraList read_transforms(const JsonField& file) {
+CameraList read_transforms(const JsonField& file, const glm::dvec3& origin) {
   CameraList list;
   const JsonField frames = file.at("frames");
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -124,7 +125,7 @@ CameraList read_transforms(const JsonField& file) {
     const auto number = [&](std::string_view key) { return positive(frame, file, key); };
     ListedCamera& listed = list.cameras.emplace_back();
     listed.name = name_of(frame, "file_path");
-    listed.camera.world_from_camera = opengl_pose(frame.at("transform_matrix"));
+    listed.camera.world_from_camera = opengl_pose(frame.at("transform_matrix"), origin);
     const glm::vec2 size_px{number("w"), number("h")};
     glm::vec2 focal_px{number("fl_x"), number("fl_y")};
     if (focal_px.x == 0.0f) focal_px.x = focal_from_angle(number("camera_angle_x"), size_px.x);
@@ -134,7 +135,7 @@ CameraList read_transforms(const JsonField& file) {
   return list;
 }
 
-CameraList read_path(const JsonField& file) {
+CameraList read_path(const JsonField& file, const glm::dvec3& origin) {
   if (const auto type = file.find("camera_type"); type && type->text() != "perspective")
     type->fail("is not a perspective camera", "this renderer draws perspective pictures only");
   const auto number = [&](std::string_view key) { return positive(file, file, key); };
@@ -144,7 +145,7 @@ CameraList read_path(const JsonField& file) {
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const JsonField item = cameras[i];
     ListedCamera& listed = list.cameras.emplace_back();
-    listed.camera.world_from_camera = opengl_pose(item.at("camera_to_world"));
+    listed.camera.world_from_camera = opengl_pose(item.at("camera_to_world"), origin);
     const float fov_y_rad = positive(item, item, "fov") * std::numbers::pi_v<float> / 180.0f;
     set_lens(size_px, glm::vec2(focal_from_angle(fov_y_rad, size_px.y)), {}, listed.camera);
   }
@@ -159,18 +160,18 @@ CameraList read_path(const JsonField& file) {
 
 }  // namespace
 
-CameraList read_camera_json(const ByteSource& file) {
+CameraList read_camera_json(const ByteSource& file, const glm::dvec3& origin) {
   const nlohmann::json document = read_json(file, max_cameras_bytes);
   const JsonField root(file.name(), document);
-  if (document.is_array()) return read_array(root);
-  if (root.find("camera_path")) return read_path(root);
+  if (document.is_array()) return read_array(root, origin);
+  if (root.find("camera_path")) return read_path(root, origin);
   if (root.find("tours"))
     root.fail("is a sidecar, whose tours are not a camera path",
               "with ?author, the page saves the camera path of a tour as a .tum file");
   if (!root.find("frames"))
     root.fail("lists no cameras",
               "cameras.json of a 3DGS training, transforms.json or camera_path.json of nerfstudio");
-  return read_transforms(root);
+  return read_transforms(root, origin);
 }
 
 }  // namespace catgs

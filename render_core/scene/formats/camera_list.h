@@ -27,7 +27,7 @@ struct CameraList {
 ///   camera_path.json  of nerfstudio's viewer; perspective cameras only
 ///   transforms_*.json that `ns-export cameras` writes
 ///
-/// Throws InputError with the field of a mistake.
-CameraList read_camera_json(const ByteSource& file);
+/// Places are returned about `origin`. Throws InputError with the field of a mistake.
+CameraList read_camera_json(const ByteSource& file, const glm::dvec3& origin = glm::dvec3(0.0));
 
 }  // namespace catgs

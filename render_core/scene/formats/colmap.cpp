@@ -86,7 +86,7 @@ Camera make_camera_of(const std::string& file, const std::string& where, std::ui
 /// COLMAP stores camera_from_world: rotation w, x, y, z and translation.
 ListedCamera make_image(const std::string& file, const std::string& where, std::string name,
                         const std::array<double, 7>& pose, const Cameras& cameras,
-                        std::uint32_t camera_id) {
+                        std::uint32_t camera_id, const glm::dvec3& origin) {
   const auto camera = cameras.find(camera_id);
   if (camera == cameras.end()) {
     throw InputError(file, where, fmt::format("there is no camera {}", camera_id));
@@ -101,7 +101,7 @@ ListedCamera make_image(const std::string& file, const std::string& where, std::
   const glm::dquat world_from_camera = glm::conjugate(rotation / norm);
   ListedCamera image{std::move(name), camera->second};
   image.camera.world_from_camera = {
-      glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6]))),
+      glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6])) - origin),
       glm::quat(world_from_camera)};
   return image;
 }
@@ -160,7 +160,7 @@ Cameras read_binary_cameras(const std::filesystem::path& path, Distortion distor
 }
 
 std::vector<ListedCamera> read_binary_images(const std::filesystem::path& path,
-                                             const Cameras& cameras) {
+                                             const Cameras& cameras, const glm::dvec3& origin) {
   constexpr std::uint64_t point_bytes = 24;  // x, y and the number of a 3D point
   BinaryReader file(path);
   std::vector<ListedCamera> images;
@@ -171,7 +171,8 @@ std::vector<ListedCamera> read_binary_images(const std::filesystem::path& path,
     std::array<double, 7> pose;
     for (double& value : pose) value = file.next<double>();
     const auto camera_id = file.next<std::uint32_t>();
-    images.push_back(make_image(file.name(), where, file.next_name(), pose, cameras, camera_id));
+    images.push_back(
+        make_image(file.name(), where, file.next_name(), pose, cameras, camera_id, origin));
     file.skip(file.next<std::uint64_t>(), point_bytes);
   }
   return images;
@@ -235,7 +236,7 @@ bool lists_points(std::string_view text) {
 }
 
 std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
-                                           const Cameras& cameras) {
+                                           const Cameras& cameras, const glm::dvec3& origin) {
   const std::vector<Line> lines = read_lines(path);
   std::vector<ListedCamera> images;
   // A line of points, which may be none, is behind each image; further empty lines may be anywhere.
@@ -252,8 +253,8 @@ std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
       throw InputError(path.string(), where_of(lines[i]), "is not an image",
                        "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then a line of points");
     }
-    images.push_back(
-        make_image(path.string(), where_of(lines[i]), std::move(name), pose, cameras, camera_id));
+    images.push_back(make_image(path.string(), where_of(lines[i]), std::move(name), pose, cameras,
+                                camera_id, origin));
     while (i + 1 < lines.size() && lines[i + 1].text.empty()) ++i;
     if (i + 1 < lines.size() && lists_points(lines[i + 1].text)) ++i;
   }
@@ -262,18 +263,19 @@ std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
 
 }  // namespace
 
-std::vector<ListedCamera> read_colmap(const std::filesystem::path& folder, Distortion distortion) {
+std::vector<ListedCamera> read_colmap(const std::filesystem::path& folder, Distortion distortion,
+                                      const glm::dvec3& origin) {
   std::vector<ListedCamera> images;
   bool found = false;
   for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
     std::error_code error;
     if (std::filesystem::exists(model / "images.bin", error)) {
       images = read_binary_images(model / "images.bin",
-                                  read_binary_cameras(model / "cameras.bin", distortion));
+                                  read_binary_cameras(model / "cameras.bin", distortion), origin);
       found = true;
     } else if (std::filesystem::exists(model / "images.txt", error)) {
       images = read_text_images(model / "images.txt",
-                                read_text_cameras(model / "cameras.txt", distortion));
+                                read_text_cameras(model / "cameras.txt", distortion), origin);
       found = true;
     }
     if (found) break;

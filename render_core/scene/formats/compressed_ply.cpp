@@ -132,7 +132,7 @@ float unpack_sh(std::byte packed) {
 }
 
 void store(const Layout& layout, const std::byte* chunk, const std::byte* vertex,
-           GaussianCloud& cloud, std::size_t i) {
+           const glm::dvec3& origin, GaussianCloud& cloud, std::size_t i) {
   const auto between = [&](const Triple& min, const Triple& max, const glm::vec3& t) {
     return glm::mix(load_triple(chunk, min), load_triple(chunk, max), t);
   };
@@ -141,8 +141,10 @@ void store(const Layout& layout, const std::byte* chunk, const std::byte* vertex
   glm::vec3 colour(fraction(rgba, 24, 8), fraction(rgba, 16, 8), fraction(rgba, 8, 8));
   if (layout.has_colour_limits) colour = between(layout.min_colour, layout.max_colour, colour);
 
-  cloud.mean[i] =
-      between(layout.min_position, layout.max_position, unpack_11_10_11(packed(layout.position)));
+  const glm::dvec3 low(load_triple(chunk, layout.min_position)),
+      high(load_triple(chunk, layout.max_position));
+  const glm::dvec3 share(unpack_11_10_11(packed(layout.position)));
+  cloud.mean[i] = glm::vec3(glm::mix(low, high, share) - origin);
   cloud.scale[i] = exp(
       between(layout.min_log_scale, layout.max_log_scale, unpack_11_10_11(packed(layout.scale))));
   cloud.rotation[i] = unit(unpack_rotation(packed(layout.rotation)));
@@ -159,7 +161,7 @@ bool is_compressed_ply(const PlyHeader& header) {
 }
 
 GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& header,
-                                  const LoadContext& context) {
+                                  const LoadContext& context, const glm::dvec3& origin) {
   const Layout layout = find_layout(file, header);
   const int degree = require_consistent(file, header, layout);
   GaussianCloud cloud;
@@ -178,7 +180,7 @@ GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& heade
         const auto vertices = rows_of(*layout.vertex, begin, end);
         for (std::size_t i = begin; i < end; ++i)
           store(layout, chunks.data() + (i / chunk_size - first_chunk) * layout.chunk->row_bytes,
-                vertices.data() + (i - begin) * layout.vertex->row_bytes, cloud, i);
+                vertices.data() + (i - begin) * layout.vertex->row_bytes, origin, cloud, i);
         if (rest == 0) return;
         const auto sh_rows = rows_of(*layout.sh, begin, end);
         for (std::size_t i = begin; i < end; ++i) {

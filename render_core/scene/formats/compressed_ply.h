@@ -14,8 +14,9 @@ bool is_compressed_ply(const PlyHeader& header);
 /// Element `chunk` holds min_* and max_* of position, log scale and (in newer files) colour;
 /// `vertex` packed_position and packed_scale (11-10-11 bits), packed_rotation (2-10-10-10,
 /// smallest three), packed_color (8-8-8-8 with opacity); the optional `sh` f_rest_* bytes for
-/// [-4, 4]. Not sanitized. Throws InputError.
+/// [-4, 4]. Not sanitized, about `origin`. Throws InputError.
 GaussianCloud read_compressed_ply(const ByteSource& file, const PlyHeader& header,
-                                  const LoadContext& context);
+                                  const LoadContext& context,
+                                  const glm::dvec3& origin = glm::dvec3(0.0));
 
 }  // namespace catgs

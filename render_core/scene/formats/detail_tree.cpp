@@ -135,9 +135,10 @@ DetailChoice choose_detail(const DetailTree& tree, const std::string& file,
   return choice;
 }
 
-GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context) {
-  if (scene.read_all) return scene.read_all(context);
-  if (scene.parts == 1) return scene.read(0, context);
+GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context,
+                          const glm::dvec3& origin) {
+  if (scene.read_all) return scene.read_all(origin, context);
+  if (scene.parts == 1) return scene.read(0, origin, context);
   GaussianCloud whole;
   whole.resize(scene.count, scene.sh_degree);
   const auto parts = static_cast<double>(scene.parts);
@@ -145,7 +146,7 @@ GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context) {
   for (std::size_t i = 0; i < scene.parts; ++i) {
     const auto part_number = static_cast<double>(i);
     const GaussianCloud part =
-        scene.read(i, context.part(part_number / parts, (part_number + 1.0) / parts));
+        scene.read(i, origin, context.part(part_number / parts, (part_number + 1.0) / parts));
     copy_gaussians(part, done, whole);
     if (part.size() > largest) whole.model = part.model;
     largest = std::max(largest, part.size());

@@ -60,14 +60,15 @@ struct OpenLevels {
   std::size_t count = 0;           // Gaussians of the chosen levels, at least 1
   std::vector<std::string> notes;  // for people
   std::size_t parts = 0;
-  /// The Gaussians of a part with the SH degree of the whole, not sanitized. Keeps what it reads
-  /// from. Throws InputError.
-  std::function<GaussianCloud(std::size_t part, const LoadContext&)> read;
+  /// The Gaussians of a part with the SH degree of the whole, not sanitized, about `origin`. Keeps
+  /// what it reads from. Throws InputError.
+  std::function<GaussianCloud(std::size_t part, const glm::dvec3& origin, const LoadContext&)> read;
   /// All parts, if the format can read them at once; else null.
-  std::function<GaussianCloud(const LoadContext&)> read_all{};
+  std::function<GaussianCloud(const glm::dvec3& origin, const LoadContext&)> read_all{};
 };
 
 /// All parts, one after the other. The model is that of the largest part.
-GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context);
+GaussianCloud read_levels(const OpenLevels& scene, const LoadContext& context,
+                          const glm::dvec3& origin = glm::dvec3(0.0));
 
 }  // namespace catgs

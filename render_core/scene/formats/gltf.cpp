@@ -185,7 +185,7 @@ AffineMap map_of(const JsonField& node) {
     map.offset = {v[0], v[1], v[2]};
   }
   if (const auto field = node.find("rotation")) {
-    map.linear = glm::mat3_cast(glm::normalize(glm::dquat(field->orientation())));
+    map.linear = glm::mat3_cast(field->orientation());
   }
   if (const auto field = node.find("scale")) {
     const auto s = field->doubles<3>();
@@ -394,6 +394,7 @@ constexpr SceneFormat gltf_format = {
     .name = "glTF",
     .extensions = {".glb", ".gltf"},
     .may_be_mesh = true,
+    .keeps_origin = true,
     .is_mine = [](const ByteSource& file,
                   std::string_view extension) { return is_glb(file) || extension == ".gltf"; },
     .files_beside = gltf_buffer_files,
@@ -403,12 +404,15 @@ constexpr SceneFormat gltf_format = {
       return {size.count, size.sh_degree};
     },
     .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
-      GltfFile gltf =
-          read_gltf(FileSource(files.path), FolderFiles(files.path.parent_path()), context);
-      return {"glTF", std::move(gltf.cloud), std::move(gltf.notes)};
+      const FileSource file(files.path);
+      return read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+        GltfFile gltf = read_gltf(file, FolderFiles(files.path.parent_path()), context,
+                                  {left_up_front.linear, -origin});
+        return {"glTF", std::move(gltf.cloud), std::move(gltf.notes)};
+      });
     },
-    .write = [](const GaussianCloud& cloud, ThreadPool&,
-                std::ostream& to) { write_glb(cloud, to); },
+    .write = [](const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool&,
+                std::ostream& to) { write_glb(cloud, to, origin); },
 };
 
 }  // namespace catgs

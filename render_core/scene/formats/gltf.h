@@ -58,9 +58,10 @@ std::vector<std::string> gltf_buffer_files(const ByteSource& file);
 /// for rounding.
 AffineMap affine_map(const JsonField& matrix);
 
-/// Writes a .glb with floats: what read_gltf() reads from it is the same, bit for bit. Throws
-/// InputError when the file would exceed the 4 GiB of the format.
-void write_glb(const GaussianCloud& cloud, std::ostream& to);
+/// Writes a .glb with floats: what read_gltf() reads from it is the same, bit for bit. `origin`
+/// becomes a translation. Throws InputError when the file would exceed the 4 GiB of the format.
+void write_glb(const GaussianCloud& cloud, std::ostream& to,
+               const glm::dvec3& origin = glm::dvec3(0.0));
 
 extern const SceneFormat gltf_format;
 

@@ -76,7 +76,8 @@ std::vector<Attribute> attributes_of(const GaussianCloud& cloud) {
   return all;
 }
 
-nlohmann::json json_of(const GaussianCloud& cloud, const std::vector<Attribute>& attributes) {
+nlohmann::json json_of(const GaussianCloud& cloud, const glm::dvec3& origin,
+                       const std::vector<Attribute>& attributes) {
   using nlohmann::json;
   constexpr std::array types = {"", "SCALAR", "VEC2", "VEC3", "VEC4"};
   constexpr int array_buffer = 34962, points = 0;
@@ -107,11 +108,13 @@ nlohmann::json json_of(const GaussianCloud& cloud, const std::vector<Attribute>&
                           {"mode", points},
                           {"extensions", {{"KHR_gaussian_splatting", extension}}}};
   const auto list_of = [](const json& entry) { return json::array({entry}); };
+  json node = {{"mesh", 0}};
+  if (origin != glm::dvec3(0.0)) node["translation"] = {-origin.x, -origin.y, origin.z};
   return {{"asset", {{"version", "2.0"}, {"generator", "CaT-GS"}}},
           {"extensionsUsed", list_of("KHR_gaussian_splatting")},
           {"scene", 0},
           {"scenes", list_of({{"nodes", list_of(0)}})},
-          {"nodes", list_of({{"mesh", 0}})},
+          {"nodes", list_of(node)},
           {"meshes", list_of({{"primitives", list_of(primitive)}})},
           {"accessors", accessors},
           {"bufferViews", views},
@@ -120,9 +123,9 @@ nlohmann::json json_of(const GaussianCloud& cloud, const std::vector<Attribute>&
 
 }  // namespace
 
-void write_glb(const GaussianCloud& cloud, std::ostream& to) {
+void write_glb(const GaussianCloud& cloud, std::ostream& to, const glm::dvec3& origin) {
   const std::vector<Attribute> attributes = attributes_of(cloud);
-  std::string json = json_of(cloud, attributes).dump();
+  std::string json = json_of(cloud, origin, attributes).dump();
   json.append((4 - json.size() % 4) % 4, ' ');  // chunks begin at multiples of 4
   std::uint64_t binary_bytes = 0;
   for (const Attribute& attribute : attributes)

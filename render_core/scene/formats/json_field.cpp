@@ -136,28 +136,26 @@ std::vector<float> JsonField::numbers(std::size_t expected_size) const {
   return all;
 }
 
-glm::quat JsonField::orientation() const {
-  const std::vector<float> q = numbers(4);
+glm::dquat JsonField::orientation() const {
+  const auto q = doubles<4>();
   return as_orientation({q[3], q[0], q[1], q[2]});
 }
 
-glm::quat JsonField::as_orientation(const glm::quat& q) const {
-  if (std::abs(glm::length(q) - 1.0f) > 0.01f) fail("is no quaternion x, y, z, w of length 1");
+glm::dquat JsonField::as_orientation(const glm::dquat& q) const {
+  if (!(std::abs(glm::length(q) - 1.0) <= 0.01)) fail("is no quaternion x, y, z, w of length 1");
   return glm::normalize(q);
 }
 
-glm::vec3 JsonField::vec3() const {
-  const std::vector<float> v = numbers(3);
+glm::dvec3 JsonField::dvec3() const {
+  const auto v = doubles<3>();
   return {v[0], v[1], v[2]};
 }
 
-glm::vec3 JsonField::place() const { return as_place(vec3()); }
-
-glm::vec3 JsonField::as_place(const glm::vec3& at) const {
+glm::vec3 JsonField::as_place(const glm::dvec3& at, const glm::dvec3& origin) const {
   for (int k = 0; k < 3; ++k)
-    if (!(std::abs(at[k]) <= max_coordinate))
+    if (!(std::abs(at[k]) <= static_cast<double>(max_coordinate)))
       fail(fmt::format("is not a position in a scene: beyond {} units", max_coordinate));
-  return at;
+  return glm::vec3(at - origin);
 }
 
 }  // namespace catgs

@@ -42,15 +42,19 @@ class JsonField {
   [[nodiscard]] double precise_number() const;  // finite as a float too
   [[nodiscard]] std::uint64_t count() const;
   [[nodiscard]] std::string text() const;
-  [[nodiscard]] glm::vec3 vec3() const;
-  /// Three coordinates, at most max_coordinate from the origin on each axis.
-  [[nodiscard]] glm::vec3 place() const;
+  [[nodiscard]] glm::vec3 vec3() const { return glm::vec3(dvec3()); }
+  [[nodiscard]] glm::dvec3 dvec3() const;
+  /// Three coordinates, at most max_coordinate from 0 on each axis. Returned about `origin`.
+  [[nodiscard]] glm::vec3 place(const glm::dvec3& origin = glm::dvec3(0.0)) const {
+    return as_place(dvec3(), origin);
+  }
   /// The place `at`, which this field stores in another form than place() reads.
-  [[nodiscard]] glm::vec3 as_place(const glm::vec3& at) const;
+  [[nodiscard]] glm::vec3 as_place(const glm::dvec3& at,
+                                   const glm::dvec3& origin = glm::dvec3(0.0)) const;
   /// A unit quaternion x, y, z, w, to one percent; normalised.
-  [[nodiscard]] glm::quat orientation() const;
+  [[nodiscard]] glm::dquat orientation() const;
   /// The same for a quaternion that this field stores in another form.
-  [[nodiscard]] glm::quat as_orientation(const glm::quat& q) const;
+  [[nodiscard]] glm::dquat as_orientation(const glm::dquat& q) const;
   [[nodiscard]] std::vector<float> numbers(std::size_t expected_size) const;
 
   /// Numbers of double precision, each finite as a float too.

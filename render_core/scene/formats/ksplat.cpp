@@ -193,6 +193,7 @@ struct RowReader {
   const Header& header;
   const Section& section;
   const Buckets* buckets;  // null at level 0
+  glm::dvec3 origin;
 
   void operator()(const std::byte* row, std::size_t i, GaussianCloud& cloud, std::size_t to) const {
     const bool plain = header.level == 0;
@@ -202,7 +203,8 @@ struct RowReader {
     };
     for (int k = 0; k < 3; ++k) {
       const auto column = static_cast<std::size_t>(k);
-      cloud.mean[to][k] = plain ? number(column) : mean_of(row, i, k);
+      const double place = plain ? static_cast<double>(number(column)) : place_of(row, i, k);
+      cloud.mean[to][k] = static_cast<float>(place - origin[k]);
       cloud.scale[to][k] = number(3 + column);
     }
     cloud.rotation[to] = unit(glm::quat(number(6), number(7), number(8), number(9)));
@@ -222,11 +224,11 @@ struct RowReader {
   }
 
  private:
-  [[nodiscard]] float mean_of(const std::byte* row, std::size_t i, int k) const {
-    const auto steps =
-        static_cast<float>(load_as<std::uint16_t>(row + 2 * k)) - static_cast<float>(section.range);
-    return steps * (0.5f * section.block_size / static_cast<float>(section.range)) +
-           buckets->centre(i)[k];
+  [[nodiscard]] double place_of(const std::byte* row, std::size_t i, int k) const {
+    const double range = section.range;
+    const double steps = static_cast<double>(load_as<std::uint16_t>(row + 2 * k)) - range;
+    return steps * (0.5 * static_cast<double>(section.block_size) / range) +
+           static_cast<double>(buckets->centre(i)[k]);
   }
 };
 
@@ -237,7 +239,8 @@ SceneSize read_ksplat_size(const ByteSource& file) {
   return {layout.header.count, layout.sh_degree};
 }
 
-GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context) {
+GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context,
+                          const glm::dvec3& origin) {
   const Layout layout = read_layout(file);
   GaussianCloud cloud;
   cloud.resize(layout.header.count, layout.sh_degree);
@@ -246,7 +249,7 @@ GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context) {
   for (const Section& section : layout.sections) {
     std::optional<Buckets> buckets;
     if (layout.header.level > 0) buckets.emplace(file, section);
-    const RowReader read{layout.header, section, buckets ? &*buckets : nullptr};
+    const RowReader read{layout.header, section, buckets ? &*buckets : nullptr, origin};
     const LoadContext reading = context.part(static_cast<double>(first) / total,
                                              static_cast<double>(first + section.count) / total);
     reading.for_blocks(section.count, block_rows, [&](std::size_t begin, std::size_t end) {
@@ -266,7 +269,9 @@ constexpr SceneFormat ksplat_format = {
     .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".ksplat"; },
     .size = [](const SceneFiles& files) { return read_ksplat_size(FileSource(files.path)); },
     .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
-      return {"ksplat", read_ksplat(FileSource(files.path), context)};
+      return read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+        return {"ksplat", read_ksplat(FileSource(files.path), context, origin)};
+      });
     },
 };
 

@@ -16,8 +16,9 @@ namespace catgs {
 /// From the headers alone. Throws InputError as read_ksplat() does.
 SceneSize read_ksplat_size(const ByteSource& file);
 
-/// Not sanitized. Throws InputError naming the field.
-GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context);
+/// Not sanitized, about `origin`. Throws InputError naming the field.
+GaussianCloud read_ksplat(const ByteSource& file, const LoadContext& context,
+                          const glm::dvec3& origin = glm::dvec3(0.0));
 
 extern const SceneFormat ksplat_format;
 

@@ -172,10 +172,11 @@ struct Part {
   Range scale, sh_range;
 };
 
-GaussianCloud read_part(const Part& part, int sh_degree, const LoadContext& context) {
+GaussianCloud read_part(const Part& part, int sh_degree, const glm::dvec3& origin,
+                        const LoadContext& context) {
   GaussianCloud cloud;
   cloud.resize(part.count, sh_degree);
-  const CloudTransform transform({quarter_turn_about_x, {}});
+  const CloudTransform transform({quarter_turn_about_x, -origin});
   context.for_blocks(part.count, 4096, [&](std::size_t begin, std::size_t end) {
     const auto bytes_of = [&](const Table& table, std::size_t used) {
       std::vector<std::byte> bytes((end - begin - 1) * table.stride + used);
@@ -258,8 +259,8 @@ OpenLevels open_lcc(const std::shared_ptr<const FileSet>& folder, const std::str
   if (environment) parts->push_back(*environment);
   scene.parts = parts->size();
   scene.read = [folder, parts, degree = scene.sh_degree, model = meta.statements.model](
-                   std::size_t part, const LoadContext& context) {
-    GaussianCloud cloud = read_part((*parts)[part], degree, context);
+                   std::size_t part, const glm::dvec3& origin, const LoadContext& context) {
+    GaussianCloud cloud = read_part((*parts)[part], degree, origin, context);
     cloud.model = model.value_or(cloud.model);
     return cloud;
   };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
@@ -33,7 +34,7 @@ constexpr std::size_t max_nodes = std::size_t{1} << 16;
 constexpr int max_node_depth = 64;
 
 /// Its licence asks for these words.
-constexpr std::string_view origin = "LCC2: Data Organization Format originated from XGRIDS";
+constexpr std::string_view licence_words = "LCC2: Data Organization Format originated from XGRIDS";
 
 /// Gaussians [begin, begin + count) of a file.
 struct Piece {
@@ -206,23 +207,29 @@ GaussianCloud read_spz_ranges(const ByteSource& file, const Part& part,
 }
 
 GaussianCloud read_sog_ranges(const ByteSource& file, const Part& part, int sh_degree,
-                              const LoadContext& context) {
+                              const glm::dvec3& origin, const LoadContext& context) {
   const ZipFiles files(file);
   const SogMeta meta = read_sog_meta(files, "meta.json");
   require_unchanged(file, meta.count == part.held && meta.sh_degree == part.file_degree);
   GaussianCloud cloud;
   cloud.resize(part.count, sh_degree);
-  decode_sog(files, meta, part.ranges, cloud, context);
+  decode_sog(files, meta, part.ranges, cloud, context, origin);
   return cloud;
 }
 
 GaussianCloud read_part(const FileSet& folder, const Part& part, int sh_degree,
-                        const LoadContext& context) {
+                        const glm::dvec3& origin, const LoadContext& context) {
   const auto file = folder.open(part.name);
   const LoadContext reading = context.part(0.0, 0.8);
-  GaussianCloud cloud = part.is_spz
-                            ? with_sh_degree(read_spz_ranges(*file, part, reading), sh_degree)
-                            : read_sog_ranges(*file, part, sh_degree, reading);
+  // An .spz has at most 24 bits a coordinate, which a float holds.
+  const glm::dvec3 stored_origin = glm::transpose(quarter_turn_about_x) * origin;
+  GaussianCloud cloud;
+  if (part.is_spz) {
+    cloud = with_sh_degree(read_spz_ranges(*file, part, reading), sh_degree);
+    move_origin(cloud, stored_origin);
+  } else {
+    cloud = read_sog_ranges(*file, part, sh_degree, stored_origin, reading);
+  }
   const CloudTransform transform({quarter_turn_about_x, {}});
   context.part(0.8, 1.0).for_blocks(cloud.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) transform.apply(cloud, i);
@@ -255,7 +262,7 @@ OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::st
   scene.format = fmt::format("LCC2 ({})", choice.text);
   scene.levels = lcc2.tree.levels();
   scene.count = choice.count + always;
-  scene.notes.emplace_back(origin);
+  scene.notes.emplace_back(licence_words);
   int file_degree = 0;
   for (const Part& part : *parts) file_degree = std::max(file_degree, part.file_degree);
   for (const std::string& note : notes_of_degree(file_degree)) add_note(scene.notes, note);
@@ -266,8 +273,8 @@ OpenLevels open_lcc2(const std::shared_ptr<const FileSet>& folder, const std::st
   require_plausible_count(*file, "root", scene.count, sog_least_bytes, files.bytes(), most);
   scene.parts = parts->size();
   scene.read = [folder, parts, degree = scene.sh_degree, model = lcc2.statements.model](
-                   std::size_t part, const LoadContext& context) {
-    GaussianCloud cloud = read_part(*folder, (*parts)[part], degree, context);
+                   std::size_t part, const glm::dvec3& origin, const LoadContext& context) {
+    GaussianCloud cloud = read_part(*folder, (*parts)[part], degree, origin, context);
     cloud.model = model.value_or(cloud.model);
     return cloud;
   };

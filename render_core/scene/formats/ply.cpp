@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <ostream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -47,7 +46,8 @@ struct Field {
 struct Layout {
   int sh_degree = 0;
   std::vector<Field> fields;
-  float colour_unit = 0.0f;  // of red, green, blue in place of f_dc; 0: there are f_dc
+  float colour_unit = 0.0f;            // of red, green, blue in place of f_dc; 0: there are f_dc
+  std::array<std::size_t, 3> place{};  // properties x, y, z
 };
 
 std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
@@ -99,6 +99,7 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
     layout.colour_unit = 1.0f / full_colour(vertex.find(colours[0])->type);
   for (std::size_t k = 0; k < 3; ++k) {
     add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
+    layout.place[k] = layout.fields.back().property;
     add(at(offsetof(Row, dc)) + k, colours[k]);
     if (k < 2 || !is_of_surfels(vertex))
       add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
@@ -135,15 +136,15 @@ void store(const Row& row, const Layout& layout, GaussianCloud& cloud, std::size
 }
 
 template <class T>
-float load_big_endian(const std::byte* from) {
+double load_big_endian(const std::byte* from) {
   std::array<std::byte, sizeof(T)> swapped;
   std::reverse_copy(from, from + sizeof(T), swapped.begin());
-  return static_cast<float>(std::bit_cast<T>(swapped));
+  return static_cast<double>(std::bit_cast<T>(swapped));
 }
 
-float load_scalar(const std::byte* from, PlyType type, bool big_endian) {
+double load_scalar(const std::byte* from, PlyType type, bool big_endian) {
   const auto load = [&]<class T>(T) {
-    return big_endian ? load_big_endian<T>(from) : static_cast<float>(load_as<T>(from));
+    return big_endian ? load_big_endian<T>(from) : static_cast<double>(load_as<T>(from));
   };
   switch (type) {
     case PlyType::i8:
@@ -163,7 +164,15 @@ float load_scalar(const std::byte* from, PlyType type, bool big_endian) {
     case PlyType::f64:
       return load(double{});
   }
-  return 0.0f;
+  return 0.0;
+}
+
+/// Whether places are more exact than floats.
+bool has_precise_places(const PlyElement& vertex) {
+  return std::ranges::any_of(std::array{"x", "y", "z"}, [&](const char* name) {
+    const PlyProperty* property = vertex.find(name);
+    return property && property->type != PlyType::f32;
+  });
 }
 
 /// Rows per block: about 128 KiB, so that a block stays in the second-level cache.
@@ -172,8 +181,8 @@ std::size_t block_rows(std::size_t row_bytes) {
 }
 
 void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout& layout,
-                 bool big_endian, const FileRows& rows, GaussianCloud& cloud,
-                 const LoadContext& context) {
+                 bool big_endian, const FileRows& rows, const glm::dvec3& origin,
+                 GaussianCloud& cloud, const LoadContext& context) {
   const bool plain =
       !big_endian && std::all_of(layout.fields.begin(), layout.fields.end(), [&](const Field& f) {
         return vertex.properties[f.property].type == PlyType::f32;
@@ -181,18 +190,30 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
   const auto decode_row = [&](const std::byte* from, float* row) {
     for (const Field& f : layout.fields) {
       const PlyProperty& p = vertex.properties[f.property];
-      row[f.destination] = plain ? load_as<float>(from + p.offset)
-                                 : load_scalar(from + p.offset, p.type, big_endian);
+      row[f.destination] =
+          plain ? load_as<float>(from + p.offset)
+                : static_cast<float>(load_scalar(from + p.offset, p.type, big_endian));
     }
   };
+  const auto place_of = [&](const std::byte* from) {
+    glm::dvec3 place;
+    for (int k = 0; k < 3; ++k) {
+      const PlyProperty& p = vertex.properties[layout.place[static_cast<std::size_t>(k)]];
+      place[k] = load_scalar(from + p.offset, p.type, big_endian);
+    }
+    return place;
+  };
+  const bool moves = origin != glm::dvec3(0.0);
   context.for_blocks(cloud.size(), block_rows(vertex.row_bytes),
                      [&](std::size_t begin, std::size_t end) {
                        const std::vector<std::byte> bytes =
                            read_rows(file, vertex.data_offset, vertex.row_bytes, rows, begin, end);
                        std::array<float, row_fields> fields{};
                        for (std::size_t i = begin; i < end; ++i) {
-                         decode_row(bytes.data() + (i - begin) * vertex.row_bytes, fields.data());
+                         const std::byte* from = bytes.data() + (i - begin) * vertex.row_bytes;
+                         decode_row(from, fields.data());
                          store(std::bit_cast<Row>(fields), layout, cloud, i);
+                         if (moves) cloud.mean[i] = glm::vec3(place_of(from) - origin);
                        }
                      });
 }
@@ -202,7 +223,7 @@ class AsciiNumbers {
  public:
   AsciiNumbers(const ByteSource& file, std::uint64_t offset) : file_(file), next_read_(offset) {}
 
-  float next() {
+  double next() {
     while (at_ < end_ || next_read_ < file_.size()) {
       if (end_ - at_ < max_token) refill();
       while (at_ < end_ && is_space(buffer_[at_])) ++at_;
@@ -215,7 +236,7 @@ class AsciiNumbers {
       throw InputError(file_.name(), fmt::format("byte {}", next_read_ - (end_ - at_)),
                        at_ == end_ ? "the file ends inside the data" : "not a number");
     at_ = static_cast<std::size_t>(last - buffer_.data());
-    return static_cast<float>(value);
+    return value;
   }
 
  private:
@@ -239,7 +260,8 @@ class AsciiNumbers {
 };
 
 void read_ascii(const ByteSource& file, const PlyHeader& header, const PlyElement& vertex,
-                const Layout& layout, GaussianCloud& cloud, const LoadContext& context) {
+                const Layout& layout, const glm::dvec3& origin, GaussianCloud& cloud,
+                const LoadContext& context) {
   AsciiNumbers numbers(file, header.bytes);
   for (const PlyElement& before : header.elements) {
     if (&before == &vertex) break;
@@ -249,11 +271,13 @@ void read_ascii(const ByteSource& file, const PlyHeader& header, const PlyElemen
         for (double left = property.is_list ? numbers.next() : 1.0; left > 0.0; --left)
           numbers.next();
   }
-  std::vector<float> values(vertex.properties.size());
+  std::vector<double> values(vertex.properties.size());
   std::array<float, row_fields> fields{};
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    for (float& value : values) value = numbers.next();
-    for (const Field& f : layout.fields) fields[f.destination] = values[f.property];
+    for (double& value : values) value = numbers.next();
+    for (int k = 0; k < 3; ++k) values[layout.place[static_cast<std::size_t>(k)]] -= origin[k];
+    for (const Field& f : layout.fields)
+      fields[f.destination] = static_cast<float>(values[f.property]);
     store(std::bit_cast<Row>(fields), layout, cloud, i);
     if (i % 65536 == 0) context.report(static_cast<double>(i) / static_cast<double>(cloud.size()));
   }
@@ -273,76 +297,35 @@ void require_ascii_rows(const ByteSource& file, const PlyHeader& header, const P
 
 }  // namespace
 
-GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header,
-                       const LoadContext& context) {
+GaussianCloud read_ply(const ByteSource& file, const PlyHeader& header, const LoadContext& context,
+                       const glm::dvec3& origin) {
   const PlyElement* vertex = header.find("vertex");
   if (!vertex) throw InputError(file.name(), "header", "there is no element vertex");
   if (header.encoding != PlyEncoding::ascii) {
     require_rows_in_file(file, *vertex);
-    return read_ply_rows(file, header, {0, vertex->count}, context);
+    return read_ply_rows(file, header, {0, vertex->count}, context, origin);
   }
   const Layout layout = find_fields(file, *vertex);
   require_ascii_rows(file, header, *vertex);
   GaussianCloud cloud;
   cloud.resize(vertex->count, layout.sh_degree);
   cloud.model = model_of(header, *vertex);
-  read_ascii(file, header, *vertex, layout, cloud, context);
+  read_ascii(file, header, *vertex, layout, origin, cloud, context);
   if (is_of_surfels(*vertex)) flatten(cloud);
   return cloud;
 }
 
 GaussianCloud read_ply_rows(const ByteSource& file, const PlyHeader& header, const FileRows& rows,
-                            const LoadContext& context) {
+                            const LoadContext& context, const glm::dvec3& origin) {
   const PlyElement& vertex = *header.find("vertex");
   const Layout layout = find_fields(file, vertex);
   GaussianCloud cloud;
   cloud.resize(rows.count, layout.sh_degree);
   cloud.model = model_of(header, vertex);
-  read_binary(file, vertex, layout, header.encoding == PlyEncoding::binary_big_endian, rows, cloud,
-              context);
+  read_binary(file, vertex, layout, header.encoding == PlyEncoding::binary_big_endian, rows, origin,
+              cloud, context);
   if (is_of_surfels(vertex)) flatten(cloud);
   return cloud;
-}
-
-void write_ply(const GaussianCloud& cloud, std::ostream& to) {
-  const std::size_t rest = cloud.sh_count() - 1;
-  std::string header = "ply\nformat binary_little_endian 1.0\n";
-  if (cloud.model != SplatModel::standard)
-    header += fmt::format("comment SplatRenderMode: {}\n",
-                          cloud.model == SplatModel::surfels ? name_of(cloud.model) : "mip");
-  header += fmt::format("element vertex {}\n", cloud.size());
-  const auto property = [&](std::string_view name) {
-    header.append("property float ").append(name).append("\n");
-  };
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"})
-    property(name);
-  for (std::size_t k = 0; k < 3 * rest; ++k) property(fmt::format("f_rest_{}", k));
-  for (const char* name :
-       {"opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
-    property(name);
-  to << header << "end_header\n";
-
-  const std::size_t row_floats = 17 + 3 * rest;
-  const std::size_t rows = block_rows(row_floats * sizeof(float));
-  std::vector<float> block(rows * row_floats);
-  for (std::size_t begin = 0; begin < cloud.size(); begin += rows) {
-    const std::size_t end = std::min(cloud.size(), begin + rows);
-    float* out = block.data();
-    for (std::size_t i = begin; i < end; ++i) {
-      const glm::vec3 *sh = cloud.sh_of(i), log_scale = log(cloud.scale[i]);
-      const glm::quat& q = cloud.rotation[i];
-      for (int k = 0; k < 3; ++k) *out++ = cloud.mean[i][k];
-      for (int k = 0; k < 3; ++k) *out++ = 0.0f;
-      for (int k = 0; k < 3; ++k) *out++ = sh[0][k];
-      for (int channel = 0; channel < 3; ++channel)
-        for (std::size_t k = 0; k < rest; ++k) *out++ = sh[1 + k][channel];
-      *out++ = logit(cloud.opacity[i]);
-      for (int k = 0; k < 3; ++k) *out++ = log_scale[k];
-      for (const float component : {q.w, q.x, q.y, q.z}) *out++ = component;
-    }
-    to.write(reinterpret_cast<const char*>(block.data()),
-             static_cast<std::streamsize>((end - begin) * row_floats * sizeof(float)));
-  }
 }
 
 namespace {
@@ -371,9 +354,24 @@ DecodedScene read_any_ply(const SceneFiles& files, const LoadContext& context) {
   const FileSource file(files.path);
   const PlyHeader header = read_ply_header(file);
   if (is_compressed_ply(header))
-    return {"compressed ply", read_compressed_ply(file, header, context), header.statements.notes};
-  GaussianCloud cloud = read_ply(file, header, context);
-  return {"3DGS ply", std::move(cloud), notes_of(header)};
+    return read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+      return {"compressed ply", read_compressed_ply(file, header, context, origin),
+              header.statements.notes};
+    });
+  const auto read = [&](const glm::dvec3& origin) -> DecodedScene {
+    GaussianCloud cloud = read_ply(file, header, context, origin);
+    return {"3DGS ply", std::move(cloud), notes_of(header)};
+  };
+  const PlyElement* vertex = header.find("vertex");
+  if (header.encoding == PlyEncoding::ascii) return read_about_origin(read);
+  if (!vertex || !has_precise_places(*vertex)) return read(glm::dvec3(0.0));
+  require_rows_in_file(file, *vertex);
+  const FileRows sample = even_sample(vertex->count);
+  const glm::dvec3 origin =
+      find_origin(read_ply_rows(file, header, sample, context.part(0.0, 0.0)).mean);
+  DecodedScene scene = read(origin);
+  scene.origin = origin;
+  return scene;
 }
 
 std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t part_rows,
@@ -384,8 +382,9 @@ std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t 
   if (!vertex || header->encoding == PlyEncoding::ascii || is_compressed_ply(*header))
     return std::nullopt;
   require_rows_in_file(*file, *vertex, most);
-  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
-    return read_ply_rows(*file, *header, rows, reading);
+  const auto read = [=](const FileRows& rows, const glm::dvec3& origin,
+                        const LoadContext& reading) {
+    return read_ply_rows(*file, *header, rows, reading, origin);
   };
   return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*header));
 }
@@ -398,12 +397,13 @@ constexpr SceneFormat ply_format = {
     .kinds = "3DGS or compressed",
     .keeps_antialiased = true,
     .keeps_surfels = true,
+    .keeps_origin = true,
     .is_mine = [](const ByteSource& file, std::string_view) { return begins_with(file, "ply"); },
     .size = size_of_ply,
     .read = read_any_ply,
     .read_parts = ply_in_parts,
-    .write = [](const GaussianCloud& cloud, ThreadPool&,
-                std::ostream& to) { write_ply(cloud, to); },
+    .write = [](const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool&,
+                std::ostream& to) { write_ply(cloud, to, origin); },
 };
 
 }  // namespace catgs

@@ -10,17 +10,27 @@ std::shared_ptr<const FileSet> SceneFiles::open(std::string_view only) const {
   return std::make_shared<const FolderFiles>(path);
 }
 
+FileRows even_sample(std::uint64_t rows) {
+  const std::uint64_t step = (rows + most_origin_places - 1) / most_origin_places;
+  return {0, step == 0 ? 0 : (rows + step - 1) / step, step};
+}
+
 DecodedParts parts_of_rows(
     std::string format, std::uint64_t rows, std::uint64_t part_rows,
-    const std::function<GaussianCloud(const FileRows&, const LoadContext&)>& read,
+    const std::function<GaussianCloud(const FileRows&, const glm::dvec3& origin,
+                                      const LoadContext&)>& read,
     const LoadContext& context, std::vector<std::string> notes) {
-  const std::uint64_t step = (rows + DecodedParts::most_sampled - 1) / DecodedParts::most_sampled;
-  const auto read_part = [=](std::uint64_t part, const LoadContext& reading) {
+  DecodedScene sample = read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
+    return {.format = {}, .cloud = read(even_sample(rows), origin, context)};
+  });
+  const auto read_part = [=, origin = sample.origin](std::uint64_t part,
+                                                     const LoadContext& reading) {
     const std::uint64_t first = part * part_rows;
-    return read({first, std::min(part_rows, rows - first)}, reading);
+    return read({first, std::min(part_rows, rows - first)}, origin, reading);
   };
-  return {std::move(format), (rows + part_rows - 1) / part_rows, read_part,
-          read({0, (rows + step - 1) / step, step}, context), std::move(notes)};
+  return {std::move(format), (rows + part_rows - 1) / part_rows,
+          read_part,         std::move(sample.cloud),
+          std::move(notes),  sample.origin};
 }
 
 }  // namespace catgs

@@ -19,6 +19,7 @@
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/orbit_limits.h"
+#include "render_core/scene/scene_origin.h"
 
 namespace catgs {
 
@@ -51,23 +52,43 @@ struct DecodedScene {
   GaussianCloud cloud;
   std::vector<std::string> notes{};  // as Scene::notes
   std::optional<OrbitLimits> orbit{};
+  glm::dvec3 origin{0.0};  // that `cloud` is about, where the format is more exact than floats
 };
+
+/// Reads a scene about 0, and again about its origin where that lies elsewhere. `read(origin)`
+/// tells the DecodedScene.
+template <class Read>
+DecodedScene read_about_origin(const Read& read) {
+  DecodedScene scene = read(glm::dvec3(0.0));
+  const glm::dvec3 origin = find_origin(scene.cloud.mean);
+  if (origin == glm::dvec3(0.0)) return scene;
+  scene = {};  // makes room
+  scene = read(origin);
+  scene.origin = origin;
+  return scene;
+}
 
 /// A scene that is read part by part, not sanitized.
 struct DecodedParts {
-  static constexpr std::uint64_t most_sampled = std::uint64_t{1} << 16;  // as robust_bounds() uses
+  static constexpr std::uint64_t most_sampled = most_origin_places;  // as robust_bounds() uses
 
   std::string format;       // as Scene::format
   std::uint64_t count = 0;  // of the parts
   std::function<GaussianCloud(std::uint64_t part, const LoadContext&)> read;
   GaussianCloud sample;            // an even one of at most `most_sampled`
   std::vector<std::string> notes;  // as Scene::notes
+  glm::dvec3 origin{0.0};          // that the parts and the sample are about
 };
 
-/// The parts of a file of which any rows can be read. A part has `part_rows` of the `rows` rows.
+/// An even sample of a file's rows, of most_origin_places at most.
+FileRows even_sample(std::uint64_t rows);
+
+/// The parts of a file of which any rows can be read, about an origin. A part has `part_rows` of
+/// the `rows` rows.
 DecodedParts parts_of_rows(
     std::string format, std::uint64_t rows, std::uint64_t part_rows,
-    const std::function<GaussianCloud(const FileRows&, const LoadContext&)>& read,
+    const std::function<GaussianCloud(const FileRows&, const glm::dvec3& origin,
+                                      const LoadContext&)>& read,
     const LoadContext& context, std::vector<std::string> notes = {});
 
 /// What is to know of a format. Each format has one of these beside its reader, and
@@ -85,6 +106,7 @@ struct SceneFormat {
   bool json_is_data = false;  // any .json file in its folder may be part of the scene
   bool in_pages = false;      // renderers read what they need of it
   bool keeps_antialiased = false, keeps_surfels = false;  // a written file can tell these models
+  bool keeps_origin = false;  // a written file has the coordinates of the file before it
 
   /// Whether a file is of this format. `extension`: of its name.
   bool (*is_mine)(const ByteSource& file, std::string_view extension) = nullptr;
@@ -107,7 +129,9 @@ struct SceneFormat {
   std::size_t (*count)(const SceneFiles& files, std::optional<int> level,
                        std::optional<std::size_t> budget) = nullptr;
 
-  void (*write)(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to) = nullptr;
+  /// Writes a cloud that is about `origin`.
+  void (*write)(const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool& pool,
+                std::ostream& to) = nullptr;
   /// What a written file would not hold of the cloud, for people. Throws InputError where that is
   /// too much, as `write` does.
   std::vector<std::string> (*losses)(const GaussianCloud& cloud) = nullptr;

@@ -133,6 +133,7 @@ struct Decoder {
   const SogMeta& meta;
   std::span<const SogRange> ranges;
   GaussianCloud& cloud;
+  glm::dvec3 origin;
 
   /// The image, with `texels` or more. Sizes were checked when the meta data was read, but files of
   /// a folder may have been replaced since.
@@ -154,11 +155,11 @@ struct Decoder {
 
   /// 16 bits per axis between the limits of the logarithmic means, low and high bytes apart.
   void means() const {
-    const auto mean_of = [this](const glm::vec3& steps) {
-      const glm::vec3 v = glm::mix(meta.min_log_mean, meta.max_log_mean, steps / 65535.0f);
-      glm::vec3 mean;
+    const auto mean_of = [this](const glm::dvec3& steps) {
+      const glm::dvec3 v = glm::mix(meta.min_log_mean, meta.max_log_mean, steps / 65535.0);
+      glm::dvec3 mean;
       for (int k = 0; k < 3; ++k) mean[k] = std::copysign(std::expm1(std::abs(v[k])), v[k]);
-      return mean;
+      return glm::vec3(mean - origin);
     };
     const SogImage low = image(meta.means_low, meta.count),
                    high = image(meta.means_high, meta.count);
@@ -253,8 +254,8 @@ SogMeta parse(const ByteSource& file, const std::string& name) {
   if (const auto asset = meta.find("asset")) statements.read_members(asset->value());
   sog.model = statements.model.value_or(SplatModel::standard);
   sog.notes = std::move(statements.notes);
-  sog.min_log_mean = meta.at("means").at("mins").vec3();
-  sog.max_log_mean = meta.at("means").at("maxs").vec3();
+  sog.min_log_mean = meta.at("means").at("mins").dvec3();
+  sog.max_log_mean = meta.at("means").at("maxs").dvec3();
   sog.means_low = image_name(meta, "means", 0, 2);
   sog.means_high = image_name(meta, "means", 1, 2);
   sog.quats = image_name(meta, "quats", 0, 1);
@@ -283,13 +284,13 @@ SogMeta read_sog_meta(const FileSet& files, const std::string& name) {
 }
 
 void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRange> ranges,
-                GaussianCloud& cloud, const LoadContext& context) {
+                GaussianCloud& cloud, const LoadContext& context, const glm::dvec3& origin) {
   for ([[maybe_unused]] const SogRange& range : ranges) {
     assert(range.begin + range.count <= meta.count);
     assert(range.destination + range.count <= cloud.size());
   }
   cloud.model = meta.model;
-  const Decoder decoder{files, meta, ranges, cloud};
+  const Decoder decoder{files, meta, ranges, cloud, origin};
   // The longest step first, so that threads end together.
   std::vector<std::function<void()>> steps;
   if (meta.sh_degree > 0) steps.emplace_back([&] { decoder.rest(); });
@@ -302,10 +303,12 @@ void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRa
 
 SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadContext& context) {
   const SogMeta meta = read_sog_meta(files, meta_name);
-  SogFile sog{meta.version, {}, meta.notes};
+  SogFile sog{meta.version, {}, meta.notes, {}};
   sog.cloud.resize(meta.count, meta.sh_degree);
   const SogRange all{0, meta.count, 0};
   decode_sog(files, meta, {&all, 1}, sog.cloud, context);
+  sog.origin = find_origin(sog.cloud.mean);
+  if (sog.origin != glm::dvec3(0.0)) Decoder{files, meta, {&all, 1}, sog.cloud, sog.origin}.means();
   return sog;
 }
 
@@ -321,7 +324,10 @@ SceneSize size_of_sog(const SceneFiles& files) {
 DecodedScene read_sog_scene(const SceneFiles& files, const LoadContext& context) {
   SogFile sog = read_sog(*files.open(), index_name, context);
   return {fmt::format("sog v{} ({})", sog.version, files.index.empty() ? "zip" : "folder"),
-          std::move(sog.cloud), std::move(sog.notes)};
+          std::move(sog.cloud),
+          std::move(sog.notes),
+          {},
+          sog.origin};
 }
 
 }  // namespace
@@ -336,7 +342,8 @@ constexpr SceneFormat sog_format = {
                   std::string_view) { return begins_with(file, "PK\x03\x04"); },
     .size = size_of_sog,
     .read = read_sog_scene,
-    .write = write_sog,
+    .write = [](const GaussianCloud& cloud, const glm::dvec3&, ThreadPool& pool,
+                std::ostream& to) { write_sog(cloud, pool, to); },
     .losses = sog_losses,
 };
 

@@ -35,8 +35,8 @@ struct SogMeta {
   std::uint64_t count = 0;
   int sh_degree = 0;
   SplatModel model = SplatModel::standard;
-  std::vector<std::string> notes{};                  // for people
-  glm::vec3 min_log_mean{0.0f}, max_log_mean{0.0f};  // of sign(x) ln(|x| + 1)
+  std::vector<std::string> notes{};                 // for people
+  glm::dvec3 min_log_mean{0.0}, max_log_mean{0.0};  // of sign(x) ln(|x| + 1)
   std::array<Channel, 3> log_scale{}, sh0{};
   Channel opacity{};
   Channel sh_rest{};
@@ -61,16 +61,18 @@ struct SogRange {
   std::size_t destination = 0;
 };
 
-/// Decodes ranges into a cloud that has room for them; coefficients above the SOG's degree stay as
-/// they are. Sets the cloud's model. One image per thread is in memory at a time. Throws
-/// InputError.
+/// Decodes ranges into a cloud that has room for them, about `origin`; coefficients above the SOG's
+/// degree stay as they are. Sets the cloud's model. One image per thread is in memory at a time.
+/// Throws InputError.
 void decode_sog(const FileSet& files, const SogMeta& meta, std::span<const SogRange> ranges,
-                GaussianCloud& cloud, const LoadContext& context);
+                GaussianCloud& cloud, const LoadContext& context,
+                const glm::dvec3& origin = glm::dvec3(0.0));
 
 struct SogFile {
   int version = 0;
   GaussianCloud cloud;  // not sanitized
   std::vector<std::string> notes{};
+  glm::dvec3 origin{0.0};  // that the cloud is about
 };
 
 /// Reads the whole SOG whose meta data is `meta_name`. Throws InputError.
@@ -81,6 +83,8 @@ SogFile read_sog(const FileSet& files, const std::string& meta_name, const LoadC
 /// 0.5 sqrt(2) / 255; opacity 0.5/255. Scales and constant SH are the nearest of 256 values each.
 /// SH above is the nearest of 256 values too, of at most 65,536 palette entries, so a larger scene
 /// shares entries. Throws InputError when there are more Gaussians than an image has room for.
+/// The means are written as they are, about their origin: 16 bits of a logarithm hold no scene of
+/// more than 13 units to 1e-4, and other programs read them into floats.
 void write_sog(const GaussianCloud& cloud, ThreadPool& pool, std::ostream& to);
 /// SceneFormat::losses of it.
 std::vector<std::string> sog_losses(const GaussianCloud& cloud);

@@ -96,7 +96,7 @@ Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
   return Codebook(std::move(values));
 }
 
-float log_mean(float v) { return std::copysign(std::log1p(std::abs(v)), v); }
+double log_mean(double v) { return std::copysign(std::log1p(std::abs(v)), v); }
 
 class Writer {
  public:
@@ -156,20 +156,20 @@ class Writer {
   }
 
   void means() {
-    std::vector<glm::vec3> logarithms(cloud_.size());
-    glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
+    std::vector<glm::dvec3> logarithms(cloud_.size());
+    glm::dvec3 low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      const glm::vec3& m = cloud_.mean[i];
+      const glm::dvec3 m(cloud_.mean[i]);
       logarithms[i] = {log_mean(m.x), log_mean(m.y), log_mean(m.z)};
       low = glm::min(low, logarithms[i]);
       high = glm::max(high, logarithms[i]);
     }
-    const glm::vec3 steps = 65535.0f / glm::max(high - low, 1e-20f);
+    const glm::dvec3 steps = 65535.0 / glm::max(high - low, 1e-20);
     const auto store_byte = [&](const char* name, int effort_of_webp, int shift) {
       store(name, effort_of_webp, [&](std::size_t i) {
-        const glm::vec3 at = glm::clamp((logarithms[i] - low) * steps, 0.0f, 65535.0f);
-        const auto byte = [&](float v) {
-          return static_cast<std::uint8_t>(static_cast<int>(v + 0.5f) >> shift & 255);
+        const glm::dvec3 at = glm::clamp((logarithms[i] - low) * steps, 0.0, 65535.0);
+        const auto byte = [&](double v) {
+          return static_cast<std::uint8_t>(static_cast<int>(v + 0.5) >> shift & 255);
         };
         return std::array<std::uint8_t, 4>{byte(at.x), byte(at.y), byte(at.z), 255};
       });

@@ -94,8 +94,11 @@ namespace {
 std::optional<DecodedParts> splat_in_parts(const SceneFiles& files, std::uint64_t part_rows,
                                            std::uint64_t most, const LoadContext& context) {
   const auto file = std::make_shared<const FileSource>(files.path);
-  const auto read = [=](const FileRows& rows, const LoadContext& reading) {
-    return read_splat_rows(*file, rows, reading);
+  const auto read = [=](const FileRows& rows, const glm::dvec3& origin,
+                        const LoadContext& reading) {
+    GaussianCloud cloud = read_splat_rows(*file, rows, reading);
+    move_origin(cloud, origin);
+    return cloud;
   };
   return parts_of_rows("splat", count_splat(*file, most), part_rows, read, context);
 }
@@ -114,7 +117,7 @@ constexpr SceneFormat splat_format = {
       return {"splat", read_splat(FileSource(files.path), context)};
     },
     .read_parts = splat_in_parts,
-    .write = [](const GaussianCloud& cloud, ThreadPool&,
+    .write = [](const GaussianCloud& cloud, const glm::dvec3&, ThreadPool&,
                 std::ostream& to) { write_splat(cloud, to); },
     .losses =
         [](const GaussianCloud& cloud) {

@@ -370,7 +370,7 @@ constexpr SceneFormat spz_format = {
       return {fmt::format("spz v{}", spz.version), std::move(spz.cloud), std::move(spz.notes),
               spz.orbit};
     },
-    .write = [](const GaussianCloud& cloud, ThreadPool&,
+    .write = [](const GaussianCloud& cloud, const glm::dvec3&, ThreadPool&,
                 std::ostream& to) { write_spz(cloud, to); },
     .losses = spz_losses,
 };

@@ -88,10 +88,11 @@ StreamedSogPart open_part(const FileSet& folder, const std::string& name) {
   return {"", read_sog_meta(folder, name), {}};
 }
 
-void decode_part(const FileSet& folder, const StreamedSogPart& part, GaussianCloud& cloud,
-                 const LoadContext& context) {
-  if (part.archive.empty()) return decode_sog(folder, part.meta, part.ranges, cloud, context);
-  decode_sog(ZipFiles(*folder.open(part.archive)), part.meta, part.ranges, cloud, context);
+void decode_part(const FileSet& folder, const StreamedSogPart& part, const glm::dvec3& origin,
+                 GaussianCloud& cloud, const LoadContext& context) {
+  if (part.archive.empty())
+    return decode_sog(folder, part.meta, part.ranges, cloud, context, origin);
+  decode_sog(ZipFiles(*folder.open(part.archive)), part.meta, part.ranges, cloud, context, origin);
 }
 
 /// Files of the chosen pieces, with ranges that fill the cloud from 0 on.
@@ -240,18 +241,19 @@ OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> leve
 }
 
 GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSog& scene,
-                                     std::size_t part, const LoadContext& context) {
+                                     std::size_t part, const glm::dvec3& origin,
+                                     const LoadContext& context) {
   StreamedSogPart alone = scene.parts[part];
   const std::size_t first = alone.ranges.front().destination;
   for (SogRange& range : alone.ranges) range.destination -= first;
   GaussianCloud cloud;
   cloud.resize(size_of(alone), scene.sh_degree);
-  decode_part(folder, alone, cloud, context);
+  decode_part(folder, alone, origin, cloud, context);
   return cloud;
 }
 
 GaussianCloud read_streamed_sog(const FileSet& folder, const OpenStreamedSog& scene,
-                                const LoadContext& context) {
+                                const LoadContext& context, const glm::dvec3& origin) {
   GaussianCloud cloud;
   cloud.resize(scene.count, scene.sh_degree);
   const auto total = static_cast<double>(scene.count);
@@ -259,7 +261,7 @@ GaussianCloud read_streamed_sog(const FileSet& folder, const OpenStreamedSog& sc
   for (const StreamedSogPart& part : scene.parts) {
     const double from = static_cast<double>(done) / total;
     for (const SogRange& range : part.ranges) done += range.count;
-    decode_part(folder, part, cloud, context.part(from, static_cast<double>(done) / total));
+    decode_part(folder, part, origin, cloud, context.part(from, static_cast<double>(done) / total));
   }
   cloud.model = std::ranges::max_element(scene.parts, {}, size_of)->meta.model;
   return cloud;
@@ -280,11 +282,12 @@ OpenLevels open_levels(const std::shared_ptr<const FileSet>& files, const std::s
   scene.parts = sog->parts.size();
   for (const StreamedSogPart& part : sog->parts)
     for (const std::string& note : part.meta.notes) add_note(scene.notes, note);
-  scene.read = [files, sog](std::size_t part, const LoadContext& context) {
-    return read_streamed_sog_part(*files, *sog, part, context);
+  scene.read = [files, sog](std::size_t part, const glm::dvec3& origin,
+                            const LoadContext& context) {
+    return read_streamed_sog_part(*files, *sog, part, origin, context);
   };
-  scene.read_all = [files, sog](const LoadContext& context) {
-    return read_streamed_sog(*files, *sog, context);
+  scene.read_all = [files, sog](const glm::dvec3& origin, const LoadContext& context) {
+    return read_streamed_sog(*files, *sog, context, origin);
   };
   return scene;
 }

@@ -83,13 +83,16 @@ OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> leve
                                   std::optional<std::size_t> budget,
                                   std::uint64_t most = max_gaussians);
 
-/// The Gaussians of a part with the SH degree of the whole, not sanitized. Throws InputError.
+/// The Gaussians of a part with the SH degree of the whole, not sanitized, about `origin`. Throws
+/// InputError.
 GaussianCloud read_streamed_sog_part(const FileSet& folder, const OpenStreamedSog& scene,
-                                     std::size_t part, const LoadContext& context);
+                                     std::size_t part, const glm::dvec3& origin,
+                                     const LoadContext& context);
 
-/// All parts, not sanitized. Throws InputError.
+/// All parts, not sanitized, about `origin`. Throws InputError.
 GaussianCloud read_streamed_sog(const FileSet& folder, const OpenStreamedSog& scene,
-                                const LoadContext& context);
+                                const LoadContext& context,
+                                const glm::dvec3& origin = glm::dvec3(0.0));
 
 extern const SceneFormat streamed_sog_format;
 

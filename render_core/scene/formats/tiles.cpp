@@ -259,12 +259,13 @@ struct Chosen {
   int sh_degree = 0;
 };
 
-GaussianCloud read_part(const Chosen& chosen, std::size_t part, const LoadContext& context) {
+GaussianCloud read_part(const Chosen& chosen, std::size_t part, const glm::dvec3& origin,
+                        const LoadContext& context) {
   const Content& content = chosen.contents[part];
   const auto file = chosen.folder->open(content.name);
   const FilesBelow beside(*chosen.folder, fs::path(content.name).parent_path());
-  const AffineMap map =
-      chosen.world * content.map * AffineMap{quarter_turn_about_x, glm::dvec3(0.0)};
+  AffineMap map = chosen.world * content.map * AffineMap{quarter_turn_about_x, glm::dvec3(0.0)};
+  map.offset -= origin;
   GltfFile gltf = read_gltf(*file, beside, context, map);
   if (gltf.cloud.size() != content.size.count || gltf.cloud.sh_degree != content.size.sh_degree)
     throw InputError(file->name(), "", "was changed while the scene was read");
@@ -300,8 +301,8 @@ OpenLevels open_tiles(const std::shared_ptr<const FileSet>& folder, const std::s
                           bytes, most);
   chosen->sh_degree = scene.sh_degree;
   scene.parts = chosen->contents.size();
-  scene.read = [chosen](std::size_t part, const LoadContext& context) {
-    return read_part(*chosen, part, context);
+  scene.read = [chosen](std::size_t part, const glm::dvec3& origin, const LoadContext& context) {
+    return read_part(*chosen, part, origin, context);
   };
   return scene;
 }

@@ -282,6 +282,8 @@ TreeHeader build_tree(const SceneParts& scene, const std::filesystem::path& out,
   scene.format.copy(header.source.data(), header.source.size() - 1);
   header.levels = pages.levels();
   header.checksum = header.right_checksum();
+  header.origin = scene.origin;
+  header.origin_checksum = header.right_origin_checksum();
   file.stream().seekp(0);
   file.stream().write(reinterpret_cast<const char*>(&header), sizeof header);
   file.finish();

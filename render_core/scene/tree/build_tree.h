@@ -21,6 +21,7 @@ struct SceneParts {
   std::function<std::uint64_t(const std::function<void(const GaussianCloud&)>& take)> each;
   std::string format;      // of the scene, for people
   bool in_memory = false;  // whether the parts are in memory anyway, so that calling costs nothing
+  glm::dvec3 origin{0.0};  // that the parts are about
 };
 
 /// Builds a tree of the scene in `out`, which appears when it is whole.

@@ -107,6 +107,7 @@ TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadCont
   std::vector<NodeId> nodes;
   for (const DrawnNode& drawn : all.drawn) nodes.push_back(drawn.node);
   TreeScene scene;
+  scene.origin = tree.header().origin;
   scene.cloud = read_nodes(tree, nodes, context.part(0.4, 1.0));
   if (const auto lost = std::ranges::count(sound, 0); lost > 0)
     scene.notes.push_back(
@@ -131,6 +132,7 @@ constexpr SceneFormat tree_format = {
     .in_pages = true,
     .keeps_antialiased = true,
     .keeps_surfels = true,
+    .keeps_origin = true,
     .is_mine = [](const ByteSource& file, std::string_view) { return is_tree(file); },
     .size = [](const SceneFiles& files) -> SceneSize {
       const TreeHeader header = read_tree_header(FileSource(files.path));
@@ -138,7 +140,7 @@ constexpr SceneFormat tree_format = {
     },
     .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
       TreeScene tree = read_tree(std::make_unique<FileSource>(files.path), context);
-      return {"tree", std::move(tree.cloud), std::move(tree.notes)};
+      return {"tree", std::move(tree.cloud), std::move(tree.notes), {}, tree.origin};
     },
 };
 

@@ -27,6 +27,7 @@ GaussianCloud read_nodes(TreeFile& tree, std::span<const NodeId> nodes, const Lo
 struct TreeScene {
   GaussianCloud cloud;
   std::vector<std::string> notes;  // for people
+  glm::dvec3 origin{0.0};          // that the cloud is about
 };
 TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context);
 

@@ -37,6 +37,12 @@ std::uint32_t TreeHeader::right_checksum() const {
       crc32(0, reinterpret_cast<const Bytef*>(this), offsetof(TreeHeader, checksum)));
 }
 
+std::uint32_t TreeHeader::right_origin_checksum() const {
+  if (origin == glm::dvec3(0.0)) return 0;
+  return static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(&origin), sizeof origin));
+}
+
 bool is_tree(const ByteSource& file) {
   std::array<char, 8> magic{};
   if (file.size() < magic.size()) return false;
@@ -59,6 +65,10 @@ TreeHeader read_tree_header(const ByteSource& file) {
            "convert the scene again with this program");
   if (header.checksum != header.right_checksum())
     refuse("header", "its checksum is wrong", damaged);
+  const bool sound = header.origin_checksum == header.right_origin_checksum();
+  for (int axis = 0; axis < 3; ++axis)
+    if (!sound || !(std::abs(header.origin[axis]) <= static_cast<double>(max_coordinate)))
+      refuse("origin", "is damaged or out of range", damaged);
   if (header.sh_degree > max_sh_degree)
     refuse("SH degree", fmt::format("{} is not in 0 to 3", header.sh_degree), damaged);
   if (header.model > SplatModel::surfels || header.reserved != 0)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -38,10 +39,15 @@ struct TreeHeader {
   std::array<char, 64> source{};                // format of that scene, UTF-8, ends with a zero
   std::array<TreeLevel, most_levels> levels{};  // leaves first
   std::uint64_t checksum = 0;                   // CRC-32 of the bytes before it
+  // Zeros in older files, which are about 0.
+  glm::dvec3 origin{0.0};
+  std::uint64_t origin_checksum = 0;  // CRC-32 of the origin, unless that is 0
 
   [[nodiscard]] std::uint32_t right_checksum() const;
+  [[nodiscard]] std::uint32_t right_origin_checksum() const;
 };
-static_assert(sizeof(TreeHeader) == 568 && sizeof(TreeHeader) <= TreeShape::header_bytes);
+static_assert(offsetof(TreeHeader, origin) == 568 && sizeof(TreeHeader) == 600 &&
+              sizeof(TreeHeader) <= TreeShape::header_bytes);
 
 /// Whether a file begins like a tree.
 bool is_tree(const ByteSource& file);

@@ -58,7 +58,7 @@ class PhotoJudge {
   explicit PhotoJudge(PaperCase& scene)
       : scene_(scene),
         folder_(std::filesystem::path(scene.images()) / scene.options().image_folder),
-        images_(read_colmap(scene.images(), Distortion::refused)),
+        images_(read_colmap(scene.images(), Distortion::refused, scene.setup().scene.hints.origin)),
         pool_(*scene.setup().pool) {
     for (Row& row : rows_) {
       row.view = scene.setup().made.renderer->make_view(scene.settings(row.variant));

@@ -70,8 +70,12 @@ void copy_media(const std::filesystem::path& from_sidecar,
 }
 
 /// Estimated hints can be estimated again. Others would be lost with the files that they came from.
-void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
-  const Placement& placement = conversion.edit.placement;
+/// The sidecar counts from the 0 of the file that is written.
+void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
+                        const EditAboutOrigin& done) {
+  Placement placement = conversion.edit.placement;
+  const bool kept = keeps_origin(conversion.options.out);
+  if (!kept) placement.offset -= done.origin;
   if (hints.source.empty() || hints.source == "estimated") return;
   const auto sidecar = sidecar_of(conversion.options.out);
   if (std::error_code error; std::filesystem::exists(sidecar, error)) {
@@ -79,12 +83,24 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion) {
     return;
   }
   nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
-  if (placement.moves()) place_tours(tours, placement);
-  write_sidecar(placement.moves() ? placed(hints, placement) : hints, sidecar, &tours);
+  const glm::dvec3 origin = kept ? done.origin : glm::dvec3(0.0);
+  if (placement.moves()) place_tours(tours, placement, origin);
+  const Placement& moved = done.edit.placement;
+  SceneHints written = moved.moves() ? placed(hints, moved) : hints;
+  written.origin = origin;
+  write_sidecar(written, sidecar, &tours);
   fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
   if (!tours.is_null()) copy_media(conversion.in.hints.sidecar, sidecar);
+}
+
+/// A sidecar that is there would be that of other coordinates.
+void refuse_sidecar(const std::string& out) {
+  const auto sidecar = sidecar_of(out);
+  if (std::error_code error; std::filesystem::exists(sidecar, error))
+    throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
+                     "give the output another name, or move the file away");
 }
 
 /// Before the scene is loaded, which may take minutes.
@@ -96,10 +112,7 @@ Conversion check(const ConvertOptions& options) {
     if (std::filesystem::equivalent(path, options.out, error))
       throw InputError(options.out, "", "is the scene that is read",
                        "give the output another name");
-  const auto sidecar = sidecar_of(options.out);
-  if (conversion.edit.placement.moves() && std::filesystem::exists(sidecar, error))
-    throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
-                     "give the output another name, or move the file away");
+  if (conversion.edit.placement.moves()) refuse_sidecar(options.out);
   return conversion;
 }
 
@@ -114,10 +127,11 @@ void check_not_empty(std::size_t left) {
 }
 
 /// The parts of a scene, each of them edited. Counts what the last reading has cropped.
-SceneParts edited(const SceneParts& parts, const SceneEdit& edit,
+SceneParts edited(const SceneParts& parts, const EditAboutOrigin& about,
                   const std::shared_ptr<ThreadPool>& pool, EditCounts& counts) {
   SceneParts result = parts;
-  result.each = [each = parts.each, &edit, pool, &counts](const auto& take) {
+  result.origin = about.origin;
+  result.each = [each = parts.each, &edit = about.edit, pool, &counts](const auto& take) {
     std::size_t left = 0;
     counts = {};
     const std::uint64_t dropped = each([&](GaussianCloud part) {
@@ -143,30 +157,31 @@ bool convert_in_parts(const Conversion& conversion, bool quiet) {
   const auto scene = scene_in_parts(conversion.in, load, pool);
   if (!scene) return false;
   EditCounts counts;
-  write_tree(edited(scene->parts, conversion.edit, pool, counts), options.tree, options.out, *pool,
-             quiet);
+  const EditAboutOrigin about = about_origin(conversion.edit, scene->hints.origin);
+  write_tree(edited(scene->parts, about, pool, counts), options.tree, options.out, *pool, quiet);
   print_counts(counts);
   print_notes(scene->notes);
-  write_hints_beside(scene->hints, conversion);
+  write_hints_beside(scene->hints, conversion, about);
   return true;
 }
 
-void save(const Scene& scene, const ConvertOptions& options, bool quiet) {
-  if (!is_tree_name(options.out)) return save_scene(scene.cloud, options.out, options.threads);
+void save(const Scene& scene, const glm::dvec3& origin, const ConvertOptions& options, bool quiet) {
+  if (!is_tree_name(options.out))
+    return save_scene(scene.cloud, options.out, options.threads, origin);
   ThreadPool pool(options.threads);
   const SceneParts whole{[&](const auto& take) {
                            take(scene.cloud);
                            return std::uint64_t{scene.report.dropped};
                          },
-                         scene.format, true};
+                         scene.format, true, origin};
   write_tree(whole, options.tree, options.out, pool, quiet);
 }
 
-EditCounts edit_whole(GaussianCloud& cloud, const Conversion& conversion, bool quiet) {
-  ThreadPool pool(conversion.options.threads);
+EditCounts edit_whole(GaussianCloud& cloud, const SceneEdit& edit, int threads, bool quiet) {
+  ThreadPool pool(threads);
   Progress progress("editing", quiet);
   const LoadContext context(pool, [&](double fraction) { progress.update(fraction); });
-  const EditCounts counts = edit_cloud(cloud, conversion.edit, pool, context);
+  const EditCounts counts = edit_cloud(cloud, edit, pool, context);
   check_not_empty(cloud.size());
   return counts;
 }
@@ -176,9 +191,12 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (convert_in_parts(conversion, quiet)) return;
   constexpr bool first_view = false;  // would be estimated anew from the file that is written
   Scene scene = load_scene(conversion.in, options.in, options.threads, quiet, first_view);
-  const EditCounts counts = edit_whole(scene.cloud, conversion, quiet);
+  const EditAboutOrigin about = about_origin(conversion.edit, scene.hints.origin);
+  const bool moves = about.origin != glm::dvec3(0.0) && !keeps_origin(options.out);
+  if (moves) refuse_sidecar(options.out);
+  const EditCounts counts = edit_whole(scene.cloud, about.edit, options.threads, quiet);
   print_notes(losses_of(scene.cloud, options.out));
-  save(scene, options, quiet);
+  save(scene, about.origin, options, quiet);
   fmt::print("{}: {} of {} Gaussians, {:.1f} MB, from {}\n", options.out, scene.cloud.size(),
              scene.report.read, 1e-6 * static_cast<double>(std::filesystem::file_size(options.out)),
              scene.format);
@@ -190,7 +208,10 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (!keeps_model(options.out, scene.cloud.model))
     fmt::print(stderr, "note: {} cannot tell its model; write \"model\": \"{}\" into {}\n",
                options.out, name_of(scene.cloud.model), sidecar_of(options.out).string());
-  write_hints_beside(scene.hints, conversion);
+  if (moves)
+    fmt::print(stderr, "note: {} is about its origin: add [{}, {}, {}] to its coordinates\n",
+               options.out, about.origin.x, about.origin.y, about.origin.z);
+  write_hints_beside(scene.hints, conversion, about);
 }
 
 }  // namespace

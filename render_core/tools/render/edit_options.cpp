@@ -32,10 +32,9 @@ glm::dquat parse_rotation(std::string_view text) {
   return glm::normalize(rotation);
 }
 
-Bounds parse_box(std::string_view text) {
+CropBox parse_box(std::string_view text) {
   const auto box = parse_numbers<6>("--crop", text, "-2,-1,-2,2,1,2");
-  const Bounds bounds{glm::vec3(glm::dvec3(box[0], box[1], box[2])),
-                      glm::vec3(glm::dvec3(box[3], box[4], box[5]))};
+  const CropBox bounds{{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
   for (int k = 0; k < 3; ++k)
     if (!(bounds.min[k] < bounds.max[k]))
       throw InputError("--crop", std::string_view("xyz").substr(static_cast<std::size_t>(k), 1),

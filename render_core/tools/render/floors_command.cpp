@@ -114,8 +114,8 @@ void floors(const FloorsOptions& options, bool quiet) {
     adding_s += seconds_since(adds);
   });
   const auto searches = Clock::now();
-  const walk::WalkMap map =
-      walk::find_walkable_area(occupancy, {}, start, options.scene.path, *pool);
+  walk::WalkMap map = walk::find_walkable_area(occupancy, {}, start, options.scene.path, *pool);
+  map.origin = parts.hints.origin;
   const double search_s = seconds_since(searches);
   walk::write_walk_file(map, options.out);
   rusage usage{};

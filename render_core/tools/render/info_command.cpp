@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -55,6 +56,7 @@ Json describe(const Scene& scene, double load_ms) {
   const SanitizeReport& report = scene.report;
   const SceneHints& hints = scene.hints;
   const glm::quat& q = hints.start_pose.orientation;
+  const auto place = [&](const glm::vec3& p) { return json_place(p, hints.origin); };
   const auto largest = [&](std::size_t i) {
     return std::max({cloud.scale[i].x, cloud.scale[i].y, cloud.scale[i].z});
   };
@@ -69,7 +71,8 @@ Json describe(const Scene& scene, double load_ms) {
           {"model", name_of(cloud.model)},
           {"sh_degree", cloud.sh_degree},
           {"bytes", cloud.bytes()},
-          {"robust_bounds", {{"min", triple(bounds.min)}, {"max", triple(bounds.max)}}},
+          {"robust_bounds", {{"min", place(bounds.min)}, {"max", place(bounds.max)}}},
+          {"origin", {hints.origin.x, hints.origin.y, hints.origin.z}},
           {"opacity", quantiles(cloud, [&](std::size_t i) { return cloud.opacity[i]; })},
           {"largest_scale", quantiles(cloud, largest)},
           {"flatness", quantiles(cloud, [&](std::size_t i) { return largest(i) / smallest(i); })},
@@ -86,20 +89,23 @@ Json describe(const Scene& scene, double load_ms) {
           {"hints",
            {{"source", hints.source},
             {"up", triple(hints.up)},
-            {"start_position", triple(hints.start_pose.position)},
+            {"start_position", place(hints.start_pose.position)},
             {"start_orientation_xyzw", {q.x, q.y, q.z, q.w}},
-            {"focus", triple(hints.focus)},
+            {"focus", place(hints.focus)},
             {"near", hints.near_z},
             {"scale", hints.scale},
-            {"limits", {{"min", triple(hints.limits.min)}, {"max", triple(hints.limits.max)}}}}},
+            {"limits", {{"min", place(hints.limits.min)}, {"max", place(hints.limits.max)}}}}},
           {"notes", scene.notes},
           {"load_ms", load_ms},
           {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
 }
 
 std::string point(const Json& v) {
-  return fmt::format("{:.4g} {:.4g} {:.4g}", v[0].get<double>(), v[1].get<double>(),
-                     v[2].get<double>());
+  const auto number = [&](std::size_t k) {
+    const auto value = v[k].get<double>();
+    return std::abs(value) < 1000.0 ? fmt::format("{:.4g}", value) : fmt::format("{:.1f}", value);
+  };
+  return fmt::format("{} {} {}", number(0), number(1), number(2));
 }
 
 std::string spread(const Json& q) {

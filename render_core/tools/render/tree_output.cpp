@@ -10,6 +10,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
+#include "render_core/scene/files/hints.h"
 #include "render_core/tools/progress.h"
 
 namespace catgs {
@@ -56,7 +57,7 @@ nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const Tr
                       {"mean_error", level.mean_error},
                       {"max_error", level.max_error}});
   }
-  const auto triple = [](const glm::vec3& v) { return Json{v.x, v.y, v.z}; };
+  const auto place = [&](const glm::vec3& p) { return json_place(p, header.origin); };
   return {
       {"name", path.stem().string()},
       {"format", "tree"},
@@ -66,7 +67,8 @@ nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const Tr
       {"sh_degree", header.sh_degree},
       {"read", header.read},
       {"dropped", header.dropped},
-      {"bounds", {{"min", triple(header.low)}, {"max", triple(header.high)}}},
+      {"bounds", {{"min", place(header.low)}, {"max", place(header.high)}}},
+      {"origin", {header.origin.x, header.origin.y, header.origin.z}},
       {"bytes", bytes},
       {"bytes_per_gaussian", static_cast<double>(bytes) / static_cast<double>(header.gaussians)},
       {"pages", shape.pages()},

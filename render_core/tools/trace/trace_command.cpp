@@ -67,7 +67,7 @@ void write_checked(const TraceOptions& options, const LoadedScene& loaded,
     throw CheckFailed(
         fmt::format("{}: not written: {}; --force writes it", options.out, result.complaint()));
   }
-  write_tum(options.out, trajectory);
+  write_tum(options.out, trajectory, loaded.scene.hints.origin);
   if (!result.valid()) {
     fmt::print(stderr, "catgs-render: {}: {}\n", options.out, result.complaint());
   } else if (!quiet) {
@@ -95,7 +95,7 @@ void add_script(CLI::App& trace) {
   command->add_option("--out", options->out, "TUM file to write")->required();
   command->callback([options, command] {
     const Scene scene = load_scene(options->scene, 0, is_quiet(*command));
-    write_tum(options->out, make_script(options->script, scene.hints));
+    write_tum(options->out, make_script(options->script, scene.hints), scene.hints.origin);
   });
 }
 
@@ -178,9 +178,9 @@ void add_check(CLI::App& trace) {
   command->add_option("--trace", options->trace, fmt::format("Camera path: {}", camera_path_forms))
       ->required();
   command->callback([options, command] {
-    const Trajectory trajectory = read_camera_path(options->trace).poses;
+    const CameraPath path = read_camera_path(options->trace);
     const LoadedScene loaded = load_for_trace(*options, is_quiet(*command));
-    const TraceCheck result = check(*options, loaded, trajectory);
+    const TraceCheck result = check(*options, loaded, path.poses_about(loaded.scene.hints.origin));
     if (!result.valid()) {
       throw CheckFailed(fmt::format("{}: {}", options->trace, result.complaint()));
     }

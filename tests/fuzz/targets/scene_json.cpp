@@ -148,7 +148,7 @@ void parse_film(Bytes input) {
   require(request.size_px.x >= 16 && request.size_px.x <= 8192, "pictures have a width");
   require(request.size_px.y >= 16 && request.size_px.y <= 4320, "pictures have a height");
   for (const FilmView& view : request.views) {
-    require_sound(view.world_from_camera);
+    require_sound(view.pose_about(glm::dvec3(0.0)));
     require(view.fov_y_rad > 0.08f && view.fov_y_rad < 2.8f, "fields of view are sane");
   }
 }

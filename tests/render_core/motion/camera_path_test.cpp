@@ -126,6 +126,41 @@ TEST_F(CameraPaths, ColmapByItsFolderOrFileWhateverTheLens) {
   EXPECT_EQ(read_camera_path(file, 2.0).poses[1].time_us, 500'000);
 }
 
+TEST_F(CameraPaths, PlacesFarFromZeroKeepTheirDigits) {
+  constexpr glm::dvec3 first(500123.4, 5412345.3, 431.2), second(500124.5, 5412345.1, 431.3);
+  const auto line = [](const char* form, const glm::dvec3& at) {
+    return fmt::format(fmt::runtime(form), at.x, at.y, at.z);
+  };
+  folder_.write("cameras.txt", "5 PINHOLE 64 48 40 41 31 23\n");
+  const std::vector<std::filesystem::path> files = {
+      folder_.write("a.tum",
+                    line("0 {} {} {} 0 0 0 1\n", first) + line("1 {} {} {} 0 0 0 1\n", second)),
+      folder_.write("images.txt", line("1 1 0 0 0 {} {} {} 5 a.jpg\n\n", -first) +
+                                      line("2 1 0 0 0 {} {} {} 5 b.jpg\n\n", -second)),
+      folder_.write("a.json",
+                    line(R"({{"frames": [{{"transform_matrix": [[1, 0, 0, {}], [0, -1, 0, {}],
+                             [0, 0, -1, {}], [0, 0, 0, 1]]}},)",
+                         first) +
+                        line(R"({{"transform_matrix": [1, 0, 0, {}, 0, -1, 0, {}, 0, 0, -1, {},
+                                 0, 0, 0, 1]}}]}})",
+                             second))};
+  const glm::dvec3 scene_origin(500100.0, 5412300.0, 400.0);
+  for (const auto& file : files) {
+    const CameraPath path = read_camera_path(file);
+    EXPECT_EQ(path.origin, glm::round(first)) << file;
+    const Trajectory poses = path.poses_about(scene_origin);
+    ASSERT_EQ(poses.size(), 2u) << file;
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_LT(glm::distance(glm::dvec3(poses[i].world_from_camera.position) + scene_origin,
+                              i == 0 ? first : second),
+                1e-4)
+          << file;
+    write_tum(folder_ / "again.tum", poses, scene_origin);
+    const Trajectory again = read_tum(folder_ / "again.tum", scene_origin);
+    EXPECT_EQ(again[1].world_from_camera.position, poses[1].world_from_camera.position);
+  }
+}
+
 TEST_F(CameraPaths, TheContentTellsTheForm) {
   const std::string text = fmt::format(R"( [{{"transform": [{}]}}])", opengl_rows);
   expect_camera(read("path.txt", text).poses.at(0).world_from_camera);

@@ -57,6 +57,25 @@ TEST(WalkFile, KeepsAMap) {
   EXPECT_EQ(back.storeys[1].area, map.storeys[1].area);
 }
 
+TEST(WalkFile, KeepsTheOriginOfTheScene) {
+  WalkMap map = test::hand_made_map({3, 2}, [](int, int) { return Kind::clear; });
+  map.origin = {500123.0, 5412345.0, 431.0};
+  const std::string bytes = pack(map);
+  EXPECT_EQ(read(bytes).origin, map.origin);
+  EXPECT_EQ(read(bytes).places, map.places);
+  std::string changed = bytes;
+  const double nowhere = 1e10;
+  std::memcpy(changed.data() + 320, &nowhere, sizeof nowhere);
+  test::seal(changed);
+  EXPECT_EQ(test::refusal_of([&] { read(changed); }).where, "origin of the scene");
+  changed = bytes.substr(0, 330);
+  test::seal(changed);
+  EXPECT_EQ(test::refusal_of([&] { read(changed); }).where, "origin of the scene");
+  map.origin = {};
+  EXPECT_EQ(read(pack(map)).origin, map.origin);
+  EXPECT_EQ(pack(map).size(), bytes.size() - 24) << "as files always were";
+}
+
 TEST(WalkFile, KeepsAMapOfManyTiles) {
   const WalkMap map = test::hand_made_map({150, 70}, [](int x, int y) {
     return x < 64 && y < 64 ? Kind{9} : static_cast<Kind>((x + 3 * y) % 4);

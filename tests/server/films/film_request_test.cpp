@@ -22,8 +22,8 @@ TEST(FilmRequest, RepeatsViewsAndKeepsTheFieldOfView) {
   const FilmRequest request = parse_film_request(film(view + ", 2, [4, 5, 6, 0, 0, 0, 1], 1"));
   ASSERT_EQ(request.views.size(), 5u);
   EXPECT_EQ(request.size_px, glm::ivec2(320, 180));
-  EXPECT_EQ(request.views[2].world_from_camera.position, glm::vec3(1, 2, 3));
-  EXPECT_EQ(request.views[4].world_from_camera.position, glm::vec3(4, 5, 6));
+  EXPECT_EQ(request.views[2].position, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(request.views[4].position, glm::dvec3(4, 5, 6));
   EXPECT_NEAR(request.views[4].fov_y_rad, 1.0471976f, 1e-6f);
 }
 

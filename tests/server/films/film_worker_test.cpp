@@ -27,7 +27,7 @@ class FilmWorker : public testing::Test {
                                                       .pool = std::make_shared<ThreadPool>(2)})
                          .renderer;
     scene.facts.near_z = 0.2f;
-    view.world_from_camera.position = {0, 0, -6};
+    view.position = {0, 0, -6};
   }
   Image drawn(FilmKind kind, glm::ivec2 size_px) {
     calls = 0;
@@ -66,7 +66,7 @@ TEST_F(FilmWorker, APictureInPartsIsThePicture) {
   const Image picture = drawn(FilmKind::picture, size_px);
   EXPECT_GE(calls, 6) << "after each part";
   FrameRequest request;
-  request.camera = make_camera(view.world_from_camera, size_px,
+  request.camera = make_camera(view.pose_about({0, 0, 0}), size_px,
                                focal_from_fov_y(view.fov_y_rad, size_px.y), 0.2f);
   const auto whole_view = scene.renderer->make_view({Pipeline::exact, PixelFormat::rgb_f32});
   FrameView frame;
@@ -109,7 +109,7 @@ TEST_F(FilmWorker, SceneIsLetGoWhereItIsNeededElsewhere) {
 TEST_F(FilmWorker, AFilmIsAnMp4AndCanBeCancelled) {
   FilmRequest wanted{FilmKind::film, {64, 48}, {view, view}};
   for (int i = 0; i < 6; ++i) {
-    view.world_from_camera.position.x += 0.1f;
+    view.position.x += 0.1;
     wanted.views.push_back(view);
   }
   ResultFile file;

@@ -142,6 +142,24 @@ TEST_F(SidecarSaverTest, SavedTextsAreShownAtOnce) {
   EXPECT_EQ(shown().title, "hall") << "its name again";
 }
 
+TEST_F(SidecarSaverTest, SavedPlacesAreThoseOfTheFile) {
+  const auto far = std::make_shared<SceneEntry>(*scene_);
+  far->facts.origin = {500123.0, 5412345.0, 431.0};
+  library_->revise(hall_, far);
+  const std::string sent =
+      R"({"start_pose": {"position": [500123.5, 5412345, 427], "orientation": [0, 0, 0, 1]},
+          "focus": [500123.25, 5412345, 431]})";
+  Saved saved = save(sent);
+  run_until([&] { return is_ready(saved); });
+  EXPECT_EQ(saved.get().status, 200);
+  const SceneFacts& facts = library_->in_memory(hall_)->facts;
+  EXPECT_EQ(facts.start_pose.position, glm::vec3(0.5f, 0.0f, -4.0f));
+  EXPECT_EQ(facts.focus, glm::vec3(0.25f, 0.0f, 0.0f));
+  EXPECT_EQ(facts.origin, far->facts.origin);
+  EXPECT_EQ(on_disk(), sent);
+  run_all();
+}
+
 TEST_F(SidecarSaverTest, StoppingFinishesTheBegunSaveAndAnswersTheOthers) {
   Saved begun = save(sidecar_at(1));
   Saved waits = save(sidecar_at(2));

@@ -233,6 +233,29 @@ TEST(ComputedWalkableArea, NeedsTheCacheForManyGaussians) {
   EXPECT_THAT(error(4'000'000), Not(HasSubstr("--cache-dir")));
 }
 
+TEST(ComputedWalkableArea, LiesInTheCoordinatesOfAFarFile) {
+  const TemporaryFolder folder;
+  const auto area_at = [&](const glm::dvec3& at) {
+    save_scene(room(0.9f), folder / "a.ply", 1, at);
+    WalkableAreaSource source;
+    source.scene = locate_scene(folder / "a.ply");
+    source.start = at + glm::dvec3(2.0, 2.0, 1.6);
+    source.up = {0, 0, 1};
+    source.metres_per_unit = 1.0f;
+    return map_in(compute_walkable_area(source, 2, [] {}));
+  };
+  const glm::dvec3 there(500123.0, 5412345.0, 431.0);
+  const walk::WalkMap near = area_at({0.0, 0.0, 0.0}), far = area_at(there);
+  EXPECT_EQ(near.origin, glm::dvec3(0.0));
+  EXPECT_LT(glm::distance(far.origin, there), 30.0);
+  const glm::dvec3 moved =
+      glm::dvec3(far.grid.origin) + far.origin - glm::dvec3(near.grid.origin) - there;
+  EXPECT_LT(glm::length(moved), 1e-3);
+  EXPECT_EQ(far.size, near.size);
+  const auto places = static_cast<double>(near.places.size());
+  EXPECT_NEAR(static_cast<double>(far.places.size()), places, 0.01 * places);
+}
+
 /// The public demo: its ground is found without its file.
 TEST(ComputedWalkableArea, IsFoundInAProceduralScene) {
   WalkableAreaSource source;

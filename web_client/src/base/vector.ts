@@ -20,6 +20,10 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
+/** A coordinate with so many digits, or with four decimals where that is more: scenes may be far from 0. */
+export const short_coordinate = (v: number, digits: number): number =>
+  Number(Math.abs(v) < 1000 ? v.toPrecision(digits) : v.toFixed(4));
+
 export const same = (a: Vec3, b: Vec3): boolean => a.every((v, i) => v === b[i]);
 
 /** Returns `fallback` where `a` has no direction. */

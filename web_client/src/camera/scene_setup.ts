@@ -1,8 +1,10 @@
 import type { Vec3 } from '../base/vector';
 import type { Pose } from './eye';
 
-/** What the camera needs to know of a scene. World units. */
+/** What the camera needs to know of a scene. World units; all places are in the coordinates of the scene's file. */
 export interface SceneSetup {
+  /** Places on the wire have 32 bits and are about it; undefined: about 0. */
+  readonly origin?: Vec3 | undefined;
   readonly up: Vec3;
   readonly start_pose: Pose;
   readonly focus: Vec3;

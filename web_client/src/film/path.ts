@@ -1,4 +1,5 @@
 // The camera of a film, frame by frame, as the page plays a tour. Pure.
+import { short_coordinate } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { default_stay_s, flight_to, type Tour } from '../tour/tour';
@@ -38,7 +39,7 @@ export function write_views(eyes: readonly Eye[]): (readonly number[] | number)[
   let last = '';
   for (const { position, orientation, fov_y_rad } of eyes) {
     const view = [
-      ...position.map((v) => Number(v.toPrecision(7))),
+      ...position.map((v) => short_coordinate(v, 7)),
       ...orientation.map((v) => Number(v.toFixed(6))),
       Number(((fov_y_rad * 180) / Math.PI).toFixed(3)),
     ];

@@ -1,11 +1,11 @@
 // Converts cameras and scenes between the client and the wire.
-import type { Vec3 } from '../base/vector';
-import type { Eye } from '../camera/eye';
+import { add, type Vec3 } from '../base/vector';
+import type { Eye, Pose } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
 import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
 
-type WireVector = NonNullable<SceneFacts['up']>;
+type WireVector = Pick<NonNullable<SceneFacts['up']>, 'x' | 'y' | 'z'>;
 type WirePose = NonNullable<FrameHeader['renderPose']>;
 
 export function pose_message(
@@ -41,14 +41,23 @@ export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
   };
 }
 
+/** The same pose about another point than 0; `by` leads from there to 0. */
+export const moved_by = <T extends Pose>(pose: T, by: Vec3): T => ({
+  ...pose,
+  position: add(pose.position, by),
+});
+
 export function scene_setup(scene: SceneFacts): SceneSetup {
-  const { position, orientation } = eye_of(scene.startPose, 0);
+  const origin = vector_of(scene.origin);
+  const place_of = (v: WireVector | undefined): Vec3 => add(vector_of(v), origin);
+  const { orientation } = eye_of(scene.startPose, 0);
   return {
+    origin,
     up: vector_of(scene.up),
-    start_pose: { position, orientation },
-    focus: vector_of(scene.focus),
-    limits_min: vector_of(scene.limitsMin),
-    limits_max: vector_of(scene.limitsMax),
+    start_pose: { position: place_of(scene.startPose?.position), orientation },
+    focus: place_of(scene.focus),
+    limits_min: place_of(scene.limitsMin),
+    limits_max: place_of(scene.limitsMax),
     near_z: scene.nearZ,
     scale: scene.scale,
   };

@@ -1,5 +1,5 @@
 // Links that lead back to a view. The view is in the fragment, which no server sees. Pure.
-import { unit } from '../base/vector';
+import { short_coordinate, unit } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { text } from '../text/text';
@@ -21,7 +21,7 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
   if (view.eye) {
     const { position, orientation, fov_y_rad } = view.eye;
     const numbers = [...position, ...orientation, (fov_y_rad * 180) / Math.PI];
-    fragment.set('at', numbers.map((v) => String(Number(v.toPrecision(6)))).join(','));
+    fragment.set('at', numbers.map((v) => String(short_coordinate(v, 6))).join(','));
   }
   if (view.mode) fragment.set('mode', view.mode);
   if (view.tour_index) fragment.set('tour', String(view.tour_index + 1));

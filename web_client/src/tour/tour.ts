@@ -1,5 +1,5 @@
 // Tours through a scene: stops to visit, or a film of the camera. Pure.
-import { look_at, type Quat, type Vec3 } from '../base/vector';
+import { look_at, short_coordinate, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
 import { text } from '../text/text';
@@ -154,10 +154,10 @@ export const tours_for = (tours: readonly Tour[], readers: readonly string[]): r
     })),
   }));
 
-const short = (v: number): number => Number(v.toPrecision(7));
+const short = (v: number): number => short_coordinate(v, 7);
 const degrees = (angle_rad: number): number => short((angle_rad * 180) / Math.PI);
 
-/** Writes what read_tours() reads. Numbers keep seven digits, more than anybody can see. */
+/** Writes what read_tours() reads. Numbers keep seven digits, or four decimals: more than anybody can see. */
 export function write_tours(tours: readonly Tour[]): unknown[] {
   return tours
     .filter(({ way }) => way === undefined)

@@ -117,6 +117,6 @@ function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: nu
   if (shown.pose_id >= newest_pose_id) return true;
   return (
     Math.abs(shown.fov_y_rad - camera.fov_y_rad) < same_angle_rad &&
-    same_view(shown.pose, camera.pose, camera.scene?.near_z ?? 0)
+    same_view(shown.pose, camera.pose, camera.scene)
   );
 }

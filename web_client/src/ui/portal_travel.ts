@@ -31,8 +31,7 @@ export class PortalTravel {
       if (this.awaited_ === undefined) return;
       // The server does not draw a pose again that gives the same picture.
       const { camera } = navigation;
-      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene?.near_z ?? 0))
-        this.uncover();
+      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene)) this.uncover();
     });
     window.addEventListener('popstate', () => {
       if (this.leads_elsewhere) void this.go(undefined, this.address_scene);

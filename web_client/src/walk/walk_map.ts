@@ -14,7 +14,8 @@ import {
   type Tiles,
 } from './tiles';
 
-const header_bytes = 320;
+const plain_header_bytes = 320;
+const origin_bytes = 24; // of the scene: three doubles behind the header of version 3
 const most_side = 2048;
 const most_places = 2 ** 24;
 const most_storeys = 16;
@@ -37,7 +38,7 @@ export interface Storey {
 }
 
 export interface WalkMap {
-  readonly origin: Vec3; // the world position of (0, 0, 0)
+  readonly origin: Vec3; // the position of (0, 0, 0), in the coordinates of the scene's file
   readonly axes: readonly [east: Vec3, north: Vec3, up: Vec3]; // unit vectors of the world
   readonly cell: number; // world units
   readonly step: number; // cells; the highest step up or down
@@ -178,13 +179,17 @@ function crc32(bytes: Uint8Array): number {
 
 /** Throws an Error that names the field that is wrong, of the header or of any tile. Lets the page draw meanwhile. */
 export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
-  require(file.byteLength > header_bytes && file.byteLength <= most_bytes, 'length');
+  require(file.byteLength > plain_header_bytes && file.byteLength <= most_bytes, 'length');
   const view = new DataView(file);
   const word = (at: number): number => view.getUint32(at, true);
   const float = (at: number): number => view.getFloat32(at, true);
   const triple = (at: number): Vec3 => [float(at), float(at + 4), float(at + 8)];
   const magic = String.fromCharCode(...new Uint8Array(file, 0, 8));
-  require(magic === 'catgswlk' && word(8) === 2, 'version');
+  require(magic === 'catgswlk' && (word(8) === 2 || word(8) === 3), 'version');
+  const header_bytes = plain_header_bytes + (word(8) === 3 ? origin_bytes : 0);
+  require(file.byteLength > header_bytes, 'length');
+  const double = (k: number): number =>
+    word(8) === 3 ? view.getFloat64(plain_header_bytes + 8 * k, true) : 0;
   require(crc32(new Uint8Array(file, 16)) === word(12), 'checksum');
   const [width, depth] = [word(104), word(108)];
   require(width >= 1 && width <= most_side && depth >= 1 && depth <= most_side, 'size');
@@ -193,7 +198,7 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
   require(word(120) === file.byteLength - header_bytes, 'packed bytes');
   const tiles = new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes));
   const map: WalkMap = {
-    origin: triple(16),
+    origin: add(triple(16), [double(0), double(1), double(2)]),
     axes: [triple(28), triple(40), triple(52)],
     cell: float(64),
     radius: float(68) * cells_per_eye_height,

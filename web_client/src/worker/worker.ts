@@ -1,7 +1,9 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
 import { refreshes } from '../base/patience';
-import type { CameraSample, ClipPlane, Eye } from '../camera/eye';
+import { add, dot, scale, sub, type Vec3 } from '../base/vector';
+import type { CameraSample, ClipPlane, Eye, Pose } from '../camera/eye';
+import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
@@ -10,7 +12,7 @@ import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
 import { widened_fov } from '../present/warp';
-import { eye_of, pose_message, vector_of, wire_vector } from '../session/camera_messages';
+import { eye_of, moved_by, pose_message, vector_of, wire_vector } from '../session/camera_messages';
 import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import type { SessionState } from '../session/state';
@@ -67,6 +69,7 @@ class Client {
   private camera_: CameraSample | undefined;
   private phase_: SessionState['phase'] = 'connecting';
   private host_ = ''; // the name of who presents
+  private origin_: Vec3 = [0, 0, 0]; // places of the page are those of the scene's file; here and on the wire they are about this
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
 
@@ -94,7 +97,7 @@ class Client {
   handle(message: Exclude<ToWorker, Start>): void {
     switch (message.kind) {
       case 'camera':
-        this.take_camera(message.sample);
+        this.take_camera({ ...message.sample, eye: this.to_scene(message.sample.eye) });
         break;
       case 'view':
         this.resize(message);
@@ -103,9 +106,7 @@ class Client {
         this.display_.mode = message.mode;
         break;
       case 'path':
-        this.session_.send_path(
-          message.samples.map(({ time_us, eye }) => pose_message(0, time_us, this.widened(eye))),
-        );
+        this.send_path(message.samples);
         break;
       case 'reached':
         this.session_.send({ case: 'reached', value: { tour: message.tour, stop: message.stop } });
@@ -114,7 +115,7 @@ class Client {
         this.pick(message.id, message.ray);
         break;
       case 'clip':
-        this.session_.keep({ case: 'clip', value: clip_message(message.plane) });
+        this.session_.keep({ case: 'clip', value: clip_message(message.plane, this.origin_) });
         break;
       case 'select':
         this.session_.select_scene(message.scene_id);
@@ -143,7 +144,7 @@ class Client {
         this.present(message);
         break;
       case 'ping':
-        this.session_.send({ case: 'ping', value: { place: wire_vector(message.point) } });
+        this.ping(message.point);
         break;
       case 'leave':
       case 'stop':
@@ -186,8 +187,20 @@ class Client {
     });
   }
 
+  private send_path(samples: readonly PathSample[]): void {
+    this.session_.send_path(
+      samples.map(({ time_us, eye }) => pose_message(0, time_us, this.widened(this.to_scene(eye)))),
+    );
+  }
+
+  private ping(point: Vec3): void {
+    const place = wire_vector(sub(point, this.origin_));
+    this.session_.send({ case: 'ping', value: { place } });
+  }
+
   private pick(id: number, { origin, direction }: Ray): void {
-    const value = { id, origin: wire_vector(origin), direction: wire_vector(direction) };
+    const from = sub(origin, this.origin_);
+    const value = { id, origin: wire_vector(from), direction: wire_vector(direction) };
     this.session_.send({ case: 'pick', value });
   }
 
@@ -210,7 +223,7 @@ class Client {
           say({
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
-            pose: eye_of(frame.header.renderPose, 0),
+            pose: this.to_file(eye_of(frame.header.renderPose, 0)),
             fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan.y),
           });
         },
@@ -234,7 +247,10 @@ class Client {
           this.phase_ = state.phase;
           say({ kind: 'state', state });
         },
-        welcome: (welcome) => say({ kind: 'welcome', welcome }),
+        welcome: (welcome) => {
+          this.origin_ = vector_of(welcome.scene?.origin);
+          say({ kind: 'welcome', welcome });
+        },
         config: (config) => {
           this.metrics_.configured(config);
           this.pipeline_.configure(config);
@@ -254,20 +270,23 @@ class Client {
           say({
             kind: 'lead',
             lead,
-            eye: camera && eye_of(camera.worldFromCamera, camera.fovYRad),
+            eye: camera && this.to_file(eye_of(camera.worldFromCamera, camera.fovYRad)),
           });
         },
         pinged: ({ place, byLeader }) => {
           if (place)
             say({
               kind: 'pinged',
-              point: vector_of(place),
+              point: add(vector_of(place), this.origin_),
               by_host: byLeader,
               name: this.host_,
             });
         },
         participants: ({ places }) =>
-          say({ kind: 'participants_moved', positions: places.map(vector_of) }),
+          say({
+            kind: 'participants_moved',
+            positions: places.map((place) => add(vector_of(place), this.origin_)),
+          }),
         notice: (message) => say({ kind: 'notice', message }),
         stayed: (message) => say({ kind: 'stayed', message }),
       },
@@ -283,6 +302,14 @@ class Client {
         settings: this.frame_sizes(),
       },
     );
+  }
+
+  private to_scene<T extends Pose>(pose: T): T {
+    return moved_by(pose, scale(this.origin_, -1));
+  }
+
+  private to_file<T extends Pose>(pose: T): T {
+    return moved_by(pose, this.origin_);
   }
 
   private take_camera(sample: CameraSample): void {
@@ -353,6 +380,13 @@ class Client {
     this.session_.greet_anew({ decoders: [Codec.MJPEG] });
   }
 
+  private header_in_file(header: FrameHeader): FrameHeader {
+    const { renderPose: pose } = header;
+    if (!pose?.position) return header;
+    const at = wire_vector(add(vector_of(pose.position), this.origin_));
+    return { ...header, renderPose: { ...pose, position: { ...pose.position, ...at } } };
+  }
+
   private post_snapshot(request: number): void {
     let picture;
     try {
@@ -360,12 +394,20 @@ class Client {
     } catch (error) {
       console.warn('the picture cannot be read', error);
     }
-    const snapshot = this.shown_ && picture && { header: this.shown_, ...picture };
+    const snapshot = this.shown_ &&
+      picture && {
+        header: this.header_in_file(this.shown_),
+        ...picture,
+        view: this.to_file(picture.view),
+      };
     say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
 }
 
 const clip_message = (
   plane: ClipPlane | undefined,
+  origin: Vec3,
 ): { normal?: ReturnType<typeof wire_vector>; offset?: number } =>
-  plane ? { normal: wire_vector(plane.normal), offset: plane.offset } : {};
+  plane
+    ? { normal: wire_vector(plane.normal), offset: plane.offset - dot(plane.normal, origin) }
+    : {};

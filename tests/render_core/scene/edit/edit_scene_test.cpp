@@ -88,7 +88,7 @@ TEST(EditScene, PlacingBeyondTheBoundIsRefused) {
 
 TEST(EditScene, CroppingAfterPlacingIsExact) {
   const GaussianCloud before = random_cloud(2000, 1);
-  const Bounds box{{5.0f, -10.0f, 4.0f}, {15.0f, 0.0f, 9.0f}};
+  const CropBox box{{5.0f, -10.0f, 4.0f}, {15.0f, 0.0f, 9.0f}};
   GaussianCloud placed_only = before, cropped = before;
   edit(placed_only, {.placement = somewhere});
   const EditCounts counts = edit(cropped, {.placement = somewhere, .crop = box});
@@ -108,7 +108,7 @@ TEST(EditScene, CroppingAfterPlacingIsExact) {
   EXPECT_GT(kept, 100u);
   // The faces belong to the box.
   GaussianCloud one = random_cloud(1, 0);
-  edit(one, {.crop = Bounds{one.mean[0], one.mean[0]}});
+  edit(one, {.crop = CropBox{one.mean[0], one.mean[0]}});
   EXPECT_EQ(one.size(), 1u);
 }
 
@@ -130,7 +130,7 @@ TEST(EditScene, MergingReachesANumberOrAShare) {
 }
 
 TEST(EditScene, OnlyPlacingAndCroppingWorkOnParts) {
-  EXPECT_TRUE((SceneEdit{.placement = somewhere, .crop = Bounds{}}.works_on_parts()));
+  EXPECT_TRUE((SceneEdit{.placement = somewhere, .crop = CropBox{}}.works_on_parts()));
   EXPECT_FALSE(SceneEdit{.remove_floaters = true}.works_on_parts());
   EXPECT_FALSE(SceneEdit{.keep_fraction = 0.5}.works_on_parts());
   EXPECT_FALSE(SceneEdit{.merge_to = 5}.works_on_parts());

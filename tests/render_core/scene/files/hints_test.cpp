@@ -246,8 +246,8 @@ TEST_F(JsonFiles, FilesAboveTheirLimitAreRefused) {
   };
   constexpr std::uint64_t mib = 1 << 20;
   expect_limit(4 * mib, read_meta);
-  expect_limit(4 * mib, read_sidecar);
-  expect_limit(16 * mib, read_camera_json);
+  expect_limit(4 * mib, [](const ByteSource& file) { read_sidecar(file); });
+  expect_limit(16 * mib, [](const ByteSource& file) { read_camera_json(file); });
   expect_limit(32 * mib, read_lod_tree);
 }
 

@@ -1,11 +1,16 @@
 // catgs-render convert: how it edits a scene, and what becomes of the files beside it.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -93,6 +98,90 @@ TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
   EXPECT_EQ(shared.exit_code, 2);
   EXPECT_THAT(shared.out, AllOf(HasSubstr("ball.json"), HasSubstr("another name")));
   EXPECT_FALSE(std::filesystem::exists(path("ball.sog")));
+}
+
+/// Of the places of a scene, whose order may be another, to the nearest of the wanted ones.
+template <class Wanted>
+double largest_distance(const Scene& read, const GaussianCloud& before, const Wanted& wanted) {
+  double worst = 0.0;
+  for (const glm::vec3& mean : read.cloud.mean) {
+    double nearest = 1.0;
+    for (const glm::vec3& at : before.mean)
+      nearest = std::min(nearest, glm::distance(glm::dvec3(mean) + read.hints.origin, wanted(at)));
+    worst = std::max(worst, nearest);
+  }
+  return worst;
+}
+
+/// Far from 0, a scene and all that lies in it keep their coordinates to 1e-4.
+TEST_F(Convert, FarScenesKeepTheirCoordinates) {
+  using nlohmann::json;
+  constexpr glm::dvec3 there(500123.4, 5412345.3, 431.2);
+  const std::string by = fmt::format("{},{},{}", there.x, there.y, there.z);
+  std::ofstream(path("ball.json")) << R"({
+    "start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]},
+    "tours": [{"stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0],
+                          "portal": {"scene": "b", "position": [7, 7, 7]}}]}]})";
+  ASSERT_EQ(convert("far.ply", "--translate=" + by).exit_code, 0);
+  const GaussianCloud before = load_scene(scene()).cloud;
+  const auto far_from = [](const json& place, const glm::dvec3& wanted) {
+    const glm::dvec3 at(place[0].get<double>(), place[1].get<double>(), place[2].get<double>());
+    return glm::distance(at, wanted);
+  };
+  constexpr glm::dvec3 start(0, 0, -4), aside(1, 0, 0);
+  struct Case {
+    std::string out;
+    glm::dvec3 zero;  // where the ball's middle is
+    double tolerance = 1e-4;
+    std::string in = "far.ply", options{};
+    double scale = 1.0;
+  };
+  const glm::dvec3 origin = load_scene(path("far.ply")).hints.origin;
+  EXPECT_LT(glm::distance(origin, there), 3.0);
+  const std::string named = fmt::format("[{}, {}, {}]", origin.x, origin.y, origin.z);
+  const glm::dvec3 left = there - origin;
+  const std::vector<Case> cases = {
+      {"ply.ply", there},
+      {"glb.glb", there},
+      {"tree.tree", there, 1e-3},
+      {"from_tree.ply", there, 1e-3, "tree.tree"},
+      {"sog.sog", left},
+      {"spz.spz", left},
+      {"splat.splat", left},
+      {"back.ply",
+       {0.0, 0.0, 0.0},
+       1e-4,
+       "far.ply",
+       fmt::format("--translate={},{},{}", -there.x, -there.y, -there.z)},
+      {"twice.ply", 2.0 * there, 2e-4, "far.ply", "--scale 2", 2.0}};
+  for (const Case& of : cases) {
+    SCOPED_TRACE(of.out);
+    const Outcome done =
+        run(fmt::format("convert {} {} {}", path(of.in), path(of.out), of.options));
+    ASSERT_EQ(done.exit_code, 0) << done.out;
+    EXPECT_EQ(done.out.find("add " + named) != std::string::npos, of.zero == left);
+    const Scene read = load_scene(path(of.out));
+    ASSERT_EQ(read.cloud.size(), before.size());
+    const auto wanted = [&](const glm::vec3& at) { return of.scale * glm::dvec3(at) + of.zero; };
+    EXPECT_LT(largest_distance(read, before, wanted), of.tolerance);
+    const std::string sidecar = of.out.substr(0, of.out.find('.')) + ".json";
+    const auto told = json::parse(std::ifstream(path(sidecar)));
+    const json& stop = told.at("tours")[0].at("stops")[0];
+    EXPECT_LT(far_from(told.at("start_pose").at("position"), of.zero + of.scale * start), 1e-4);
+    EXPECT_LT(far_from(stop.at("position"), of.zero + of.scale * aside), 1e-4);
+    EXPECT_EQ(stop.at("portal").at("position"), json({7, 7, 7})) << "of another scene";
+  }
+  EXPECT_LT(far_from(info("far.ply").at("hints").at("start_position"), there + start), 1e-4);
+  EXPECT_THAT(run(fmt::format("info {}", path("far.ply"))).out, HasSubstr("origin is " + named));
+  const Outcome half =
+      run(fmt::format("convert {} {} --crop={},{},{},{},{},{}", path("far.ply"), path("half.ply"),
+                      there.x - 5, there.y, there.z - 5, there.x + 5, there.y + 5, there.z + 5));
+  ASSERT_EQ(half.exit_code, 0) << half.out;
+  const auto above =
+      std::ranges::count_if(before.mean, [](const glm::vec3& m) { return m.y > 0.0f; });
+  EXPECT_EQ(load_scene(path("half.ply")).cloud.size(), static_cast<std::size_t>(above));
+  // The sidecar of far.ply counts from another 0 than a SOG would.
+  EXPECT_EQ(run(fmt::format("convert {} {}", path("far.ply"), path("far.sog"))).exit_code, 2);
 }
 
 TEST_F(Convert, MergesAndRemovesFloaters) {

@@ -1,0 +1,39 @@
+#include "render_core/scene/scene_origin.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include "render_core/math/camera.h"
+
+namespace catgs {
+
+glm::dvec3 find_origin(std::span<const glm::vec3> places) {
+  const std::size_t step =
+      std::max<std::size_t>(1, (places.size() + most_origin_places - 1) / most_origin_places);
+  std::vector<glm::vec3> sample;
+  for (std::size_t i = 0; i < places.size(); i += step)  // NaN is not within
+    if (glm::all(glm::lessThanEqual(glm::abs(places[i]), glm::vec3(max_coordinate))))
+      sample.push_back(places[i]);
+  if (sample.empty()) return glm::dvec3(0.0);
+  glm::dvec3 medians;
+  std::vector<float> values(sample.size());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::ranges::transform(sample, values.begin(), [&](const glm::vec3& p) { return p[axis]; });
+    std::nth_element(values.begin(), middle, values.end());
+    medians[axis] = static_cast<double>(*middle);
+  }
+  if (origin_near(medians) == glm::dvec3(0.0)) return glm::dvec3(0.0);
+  // Of two equal parts far apart, the medians may take one axis each.
+  return origin_near(*std::ranges::min_element(
+      sample, {}, [&](const glm::vec3& p) { return glm::distance(glm::dvec3(p), medians); }));
+}
+
+void move_origin(GaussianCloud& cloud, const glm::dvec3& by) {
+  if (by == glm::dvec3(0.0)) return;
+  for (glm::vec3& mean : cloud.mean) mean = glm::vec3(glm::dvec3(mean) - by);
+}
+
+}  // namespace catgs
