@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { Error_Code } from '#client/wire/wire';
-import { keep_screenshot, launch_browser, new_page, open } from './support/browser';
+import { keep_screenshot, launch_browser, new_page, open, windows } from './support/browser';
 import { settle } from './support/camera';
 import { clean_up } from './support/clean_up';
 import { start_fake_server, type FakeServer, type Peer, type Script } from './support/fake_server';
@@ -105,6 +105,38 @@ describe('a lost GPU context', () => {
       });
     await expect.poll(is_painted).toBe(true);
     expect(errors).toEqual([]);
+  });
+});
+
+describe('a window that moves to a finer screen', () => {
+  it('gets finer pictures, though its size in CSS pixels stays', async () => {
+    const server = await start_fake_server(stream);
+    const { page } = await open(server.url);
+    const sizes = (): unknown => bodies(server.peers[0]!, 'settings').at(-1);
+    const session = await page.context().newCDPSession(page);
+    for (const [deviceScaleFactor, width, height] of [
+      [2, 1280, 720],
+      [1, 640, 360],
+    ] as const) {
+      const screen = { width: 640, height: 360, deviceScaleFactor, mobile: false };
+      await session.send('Emulation.setDeviceMetricsOverride', screen);
+      await expect.poll(sizes).toMatchObject({ stillWidthPx: width, stillHeightPx: height });
+    }
+  });
+});
+
+describe('a phone', () => {
+  it('types in letters that it need not enlarge', async () => {
+    const server = await start_fake_server(stream);
+    const { page } = await open(`${server.url}?author`, windows.phone);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    const small = await page.evaluate(() =>
+      [...document.querySelectorAll('input, select, textarea')]
+        .filter((field) => parseFloat(getComputedStyle(field).fontSize) < 16)
+        .map((field) => field.outerHTML),
+    );
+    expect(small).toEqual([]);
+    await keep_screenshot(page, 'phone-fields');
   });
 });
 

@@ -181,6 +181,40 @@ describe('a page of another site', () => {
   });
 });
 
+it('an article scrolls over the frame until somebody clicks into it', async () => {
+  const article = await start_other_site(
+    '<iframe width="400" height="300"></iframe><p>Words<br style="line-height: 3000px"></p>',
+  );
+  const shown = await start_server(scene, ['--embed-origin', article.origin, '--min-fps', '0']);
+  const { page } = await open(article.origin);
+  await page.evaluate((src) => {
+    document.querySelector('iframe')!.src = src;
+    document.body.style.height = '3000px';
+  }, shown.url);
+  const frame = page.frames()[1]!;
+  await frame.getByRole('button', { name: 'Next stop' }).waitFor();
+  await settle(frame);
+  const start = await pose_of(frame);
+  const wheel_over_frame = async (): Promise<void> => {
+    await page.evaluate('scrollTo(0, 0)');
+    await page.mouse.move(200, 150); // over a hotspot
+    await page.mouse.wheel(0, 100);
+  };
+  const scrolled = (): Promise<number> => page.evaluate(() => scrollY);
+  await wheel_over_frame();
+  await expect.poll(scrolled).toBeGreaterThan(0);
+  await frame.getByText('Click or tap the picture').waitFor();
+  expect(await pose_of(frame)).toEqual(start);
+  await page.evaluate('scrollTo(0, 0)');
+  await page.mouse.click(30, 200);
+  await wheel_over_frame();
+  await expect.poll(() => pose_of(frame)).not.toEqual(start);
+  expect(await scrolled()).toBe(0);
+  await page.mouse.click(500, 150);
+  await wheel_over_frame();
+  await expect.poll(scrolled).toBeGreaterThan(0);
+});
+
 describe('texts of strangers', () => {
   it.each([
     ['a token', `#token=${encodeURIComponent(hostile)}`],

@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import { beforeEach, describe, expect, it } from 'vitest';
 import { AutoHeight } from '#client/session/auto_height';
 import { device_kind } from '#client/session/device';
-import { QualityChoice } from '#client/session/quality';
+import { frame_ms_of, QualityChoice } from '#client/session/quality';
 import {
   leaves_scene_open,
   scene_address,
@@ -137,6 +137,12 @@ describe('names of scenes', () => {
 });
 
 describe('automatic height', () => {
+  it('suits the slower one of server and device', () => {
+    expect(frame_ms_of({ render: 10, encode: 5, present: 12 })).toBe(15);
+    expect(frame_ms_of({ render: 2, encode: 3, present: 117 })).toBeCloseTo(100, 0);
+    expect(frame_ms_of({ render: NaN, encode: NaN, present: NaN })).toBeNaN(); // no frame came
+  });
+
   const look_often = (auto: AutoHeight, frame_ms: number, view_px = 1080): number[] => {
     const heights = [];
     for (let i = 0; i < 12; ++i) {

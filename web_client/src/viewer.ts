@@ -3,6 +3,7 @@ import { TourMedia, TourMediaFields } from './media/tour_media';
 import { make_page_parts } from './page/parts';
 import type { AccessToken } from './session/token';
 import { make_automation } from './ui/automation';
+import { AwakeScreen } from './ui/awake_screen';
 import type { CardView } from './ui/card';
 import { mount_panels } from './ui/mount_panels';
 import { mount_session } from './ui/mount_session';
@@ -35,6 +36,9 @@ export function mount_viewer(
   worker.on('participants_moved', ({ positions }) => walkable_area.show_participants(positions));
   const shared_tour = new SharedTour(parts, new Pointing(parts));
   shared_tour.left.listen(() => walkable_area.show_participants([]));
+  const screen = new AwakeScreen();
+  tours.shown.listen(({ playing }) => screen.watch('tour', playing));
+  shared_tour.takes_part.listen((takes_part) => screen.watch('leader', takes_part));
   window.catgs = make_automation(worker, navigation, clock);
   return mount_session(parts, card, stream_size, scene_id);
 }

@@ -13,6 +13,9 @@ import {
   type Pointed,
   type PointerSample,
 } from './pointers';
+import type { ScrollGate } from './scroll_gate';
+
+export type { ScrollGate };
 
 interface ViewInputListener {
   gesture(gesture: Gesture): void;
@@ -29,12 +32,13 @@ interface ViewInputListener {
 export function bind_view_input(
   view: HTMLElement,
   inertia: Inertia,
+  gate: ScrollGate,
   listener: ViewInputListener,
 ): { keys: HeldKeys; pointers: Pointers } {
   const keys = new HeldKeys();
   const pointers = new Pointers();
-  const release = bind_pointers(view, pointers, inertia, listener);
-  bind_wheel(view, inertia, listener);
+  const release = bind_pointers(view, pointers, inertia, gate, listener);
+  bind_wheel(view, inertia, gate, listener);
   view.addEventListener('contextmenu', (event) => event.preventDefault());
   bind_keys(keys, listener);
   // What was let go elsewhere is not heard of here.
@@ -51,6 +55,7 @@ function bind_pointers(
   view: HTMLElement,
   pointers: Pointers,
   inertia: Inertia,
+  gate: ScrollGate,
   listener: ViewInputListener,
 ): () => void {
   const taps = new Taps();
@@ -61,6 +66,7 @@ function bind_pointers(
     return { x: (clientX - left) / width, y: (clientY - top) / height };
   };
   view.addEventListener('pointerdown', (event) => {
+    if (!gate.takes(event)) return;
     press.end();
     if (listener.wants_presses() && event.isPrimary && event.button === 0) {
       const pressed = (): void => listener.pointed({ ...project(event), how: 'press' });
@@ -99,9 +105,8 @@ function bind_pointers(
       if (end === 'pointercancel') taps.cancel();
       if (end === 'pointerup') {
         const what = taps.up(event.timeStamp, event.clientX, event.clientY);
-        const single = event.pointerType === 'touch' ? 'touch' : 'click';
-        if (what !== 'drag')
-          listener.pointed({ ...project(event), how: what === 'tap' ? single : what });
+        const how = what !== 'tap' ? what : event.pointerType === 'touch' ? 'touch' : 'click';
+        if (how !== 'drag') listener.pointed({ ...project(event), how });
       }
       if (lifted && end === 'pointerup' && inertia.released(event.timeStamp)) {
         listener.keys_changed();
@@ -117,10 +122,16 @@ function bind_pointers(
   };
 }
 
-function bind_wheel(view: HTMLElement, inertia: Inertia, listener: ViewInputListener): void {
+function bind_wheel(
+  view: HTMLElement,
+  inertia: Inertia,
+  gate: ScrollGate,
+  listener: ViewInputListener,
+): void {
   view.addEventListener(
     'wheel',
     (event) => {
+      if (!gate.takes(event)) return;
       event.preventDefault();
       // With Shift, systems turn a wheel into a sideways one.
       const delta = event.deltaY || (event.shiftKey ? event.deltaX : 0);

@@ -12,7 +12,7 @@ import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
 import { ray_through, surface_of, type Ray } from '../camera/ray';
 import type { Walker } from '../camera/walker';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
-import { bind_view_input } from '../input/view_input';
+import { bind_view_input, type ScrollGate } from '../input/view_input';
 import type { Mark } from '../measure/measurement';
 import { scene_setup, start_mode } from '../session/camera_messages';
 import { Picks } from '../session/picks';
@@ -58,6 +58,7 @@ export class Navigation {
     worker: WorkerClient,
     clock: Clock,
     private readonly reduced_motion_: boolean,
+    private readonly gate_: ScrollGate,
   ) {
     this.picks_ = new Picks((id, ray) => worker.post({ kind: 'pick', id, ray }), browser_timers);
     if (reduced_motion_) {
@@ -208,7 +209,7 @@ export class Navigation {
   }
 
   private bind_input(): { axes: () => Axes; is_touched: () => boolean } {
-    const { keys, pointers } = bind_view_input(this.view_, this.inertia_, {
+    const { keys, pointers } = bind_view_input(this.view_, this.inertia_, this.gate_, {
       gesture: (gesture) => this.gesture(gesture),
       wheeled: (steps, is_pinch) => {
         if (this.camera.mode === 'fly' && !is_pinch) this.faster(steps);

@@ -1,7 +1,9 @@
 // The parts of the page that its larger features share.
 import { browser_storage, type KeptTexts } from '../base/browser_storage';
 import { clock_from, type Clock } from '../base/clock';
+import { ScrollGate } from '../input/scroll_gate';
 import type { AccessToken } from '../session/token';
+import { text } from '../text/text';
 import { WorkerClient } from '../worker/client';
 import { by_id } from './dom';
 import { Navigation } from './navigation';
@@ -28,7 +30,10 @@ export function make_page_parts(token: AccessToken): PageParts {
   const reduced_motion = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const worker = new WorkerClient();
   const notice = new Notice();
-  const navigation = new Navigation(view, worker, clock, reduced_motion);
+  const gate = new ScrollGate(view, location, window.parent !== window);
+  gate.refused.listen(() => notice.show(text.page.click_first, 2));
+  gate.opened.listen(() => notice.withdraw(text.page.click_first));
+  const navigation = new Navigation(view, worker, clock, reduced_motion, gate);
   const toolbar = new Toolbar(navigation);
   const seen = new SeenCamera(worker, navigation);
   const storage = browser_storage('localStorage');

@@ -17,6 +17,15 @@ export type PictureSize = number | 'auto' | 'sharp' | 'smooth';
 // Time per frame of the rate that each choice aims at.
 const target_frame_ms = { auto: 1000 / 24, sharp: 1000 / 10, smooth: 1000 / 48 } as const;
 
+const refresh_ms = 1000 / 60;
+
+/** Time per frame of the slower one: the server, or this device. Pictures wait for a refresh, too. */
+export const frame_ms_of = (stages_ms: {
+  readonly render: number;
+  readonly encode: number;
+  readonly present: number;
+}): number => Math.max(stages_ms.render + stages_ms.encode, stages_ms.present - refresh_ms);
+
 /** Chooses the size and rate of pictures: by the visitor, or by the speed of the server. */
 export class QualityChoice {
   private size_: PictureSize = 'auto';

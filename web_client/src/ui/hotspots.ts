@@ -68,8 +68,7 @@ export class Hotspots {
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {
-        event.preventDefault();
-        this.view_.dispatchEvent(new WheelEvent(event.type, event));
+        if (!this.view_.dispatchEvent(new WheelEvent(event.type, event))) event.preventDefault();
       });
       for (const arrival of ['pointerenter', 'focus']) {
         button.addEventListener(arrival, () => this.host_.classList.remove('labels-dismissed'));

@@ -23,6 +23,7 @@ type Role = 'alone' | 'watching' | 'following' | 'left' | 'presenting';
 export class SharedTour {
   /** The visitor takes part no more. */
   readonly left = new Signal();
+  readonly takes_part = new Signal<boolean>();
   private role_: Role = 'alone';
   private lead_: Lead | undefined;
   private host_eye_: Eye | undefined;
@@ -211,7 +212,9 @@ export class SharedTour {
 
   private become(role: Role): void {
     this.role_ = role;
-    if (role === 'alone' || role === 'left') this.left.emit();
+    const is_out = role === 'alone' || role === 'left';
+    if (is_out) this.left.emit();
+    this.takes_part.emit(!is_out);
     const watching = role === 'watching';
     document.body.classList.toggle('watching', watching);
     this.parts_.toolbar.watching = watching;

@@ -1,5 +1,11 @@
 import { browser_timers } from '../base/clock';
-import { QualityChoice, type PictureSize, type Quality, type View } from '../session/quality';
+import {
+  frame_ms_of,
+  QualityChoice,
+  type PictureSize,
+  type Quality,
+  type View,
+} from '../session/quality';
 import type { WorkerClient } from '../worker/client';
 
 const resize_quiet_ms = 200;
@@ -9,6 +15,7 @@ const look_interval_ms = 1000;
 export class StreamSize {
   private readonly choice_ = new QualityChoice();
   private is_live_ = false;
+  private ratio_ = window.devicePixelRatio; // as the server knows it
 
   constructor(
     private readonly element_: HTMLElement,
@@ -22,7 +29,11 @@ export class StreamSize {
       cancel();
       cancel = browser_timers.after(resize_quiet_ms, () => this.post());
     }).observe(element_);
-    setInterval(() => void this.look(), look_interval_ms);
+    setInterval(() => {
+      // The window moves to another screen: its size in CSS pixels stays.
+      if (window.devicePixelRatio !== this.ratio_) this.post();
+      void this.look();
+    }, look_interval_ms);
   }
 
   choose(size: PictureSize, max_fps: number): void {
@@ -46,11 +57,11 @@ export class StreamSize {
   private async look(): Promise<void> {
     if (!this.choice_.is_automatic || !this.is_live_) return;
     const { stages_ms } = await this.worker_.stats();
-    const frame_ms = stages_ms.render + stages_ms.encode;
-    if (this.choice_.look(frame_ms, this.view.height_px)) this.post();
+    if (this.choice_.look(frame_ms_of(stages_ms), this.view.height_px)) this.post();
   }
 
   private post(): void {
+    this.ratio_ = window.devicePixelRatio;
     this.worker_.post({ kind: 'view', view: this.view, quality: this.quality });
   }
 }

@@ -111,6 +111,10 @@ export class PlanPanel {
       this.clicked(offsetX, offsetY),
     );
     new ResizeObserver(() => this.draw_soon()).observe(this.picture_);
+    this.canvas_.addEventListener('contextrestored', () => {
+      this.pictures_.clear(); // the GPU has lost them, too
+      this.draw_soon();
+    });
     this.set_large(false);
     this.choose_storey(0);
     this.move(eye);
