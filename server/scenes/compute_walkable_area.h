@@ -15,8 +15,7 @@ namespace catgs {
 /// All that the walkable area of a scene depends on.
 struct WalkableAreaSource {
   SceneLocation scene;
-  std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
-  LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
+  std::filesystem::path tree;    // of a cache, for scenes too large to be read as a whole
   std::filesystem::path beside;  // a .walk file of the author's; empty: nowhere
   glm::vec3 start, up;           // of the scene as it is shown
   float metres_per_unit = 0.0f;  // 0: not said

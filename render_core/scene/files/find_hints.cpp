@@ -13,6 +13,7 @@
 #include "render_core/math/look_at.h"
 #include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/camera_list.h"
 
 namespace catgs {
@@ -96,13 +97,13 @@ void use_orbit(const OrbitLimits& orbit, SceneHints& hints) {
   hints.source += ", with the orbit of its file";
 }
 
+}  // namespace
+
 std::optional<Sidecar> sidecar_at(const std::filesystem::path& path) {
   std::error_code error;
   if (path.empty() || !std::filesystem::is_regular_file(path, error)) return std::nullopt;
   return read_sidecar(FileSource(path));
 }
-
-}  // namespace
 
 bool tell_anything(const HintFiles& files) {
   return files.orbit.has_value() ||
@@ -125,9 +126,9 @@ void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, 
     notes.emplace_back("its model is 2dgs, and its discs are drawn as flat Gaussians");
 }
 
-SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+SceneHints find_hints(const std::function<ViewSample()>& sample, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
-                      std::shared_ptr<ThreadPool> pool) {
+                      std::shared_ptr<ThreadPool> pool, const KeepView& keep) {
   const std::optional<Sidecar> sidecar = sidecar_at(files.sidecar);
   if (sidecar && sidecar->unknown)
     notes.push_back(
@@ -136,8 +137,12 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
 
   std::optional<glm::vec3> told = sidecar ? sidecar->up : std::nullopt;
   if (!told) told = up;
-  SceneHints hints =
-      estimate_hints(cloud, told ? *told : find_up(cloud, cameras.poses), std::move(pool));
+  const auto estimate = [&] {
+    const auto [cloud, stands_for] = sample();
+    const glm::vec3 found = told ? *told : find_up(cloud, cameras.poses, stands_for);
+    return estimate_hints(cloud, found, pool, stands_for);
+  };
+  SceneHints hints = keep ? keep(estimate) : estimate();
   if (!cameras.poses.empty())
     use_cameras(cameras, hints);
   else if (files.orbit)

@@ -3,7 +3,9 @@
 #include <functional>
 #include <utility>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/scene/files/sanitize.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/keep_if.h"
@@ -24,9 +26,8 @@ std::optional<DecodedParts> levels_in_parts(const SceneLocation& location,
   if (scene.levels == 1) return std::nullopt;
   DecodedParts parts{scene.format, scene.parts, scene.read,
                      read_levels(open(scene.levels - 1, max_gaussians), context), scene.notes};
-  const std::size_t step =
-      (parts.sample.size() + DecodedParts::most_sampled - 1) / DecodedParts::most_sampled;
-  keep_if(parts.sample, [&](std::size_t i) { return i % step == 0; });
+  const EvenSample even(parts.sample.size(), DecodedParts::most_sampled);
+  keep_if(parts.sample, [&](std::size_t i) { return even.contains(i); });
   return parts;
 }
 
@@ -53,8 +54,6 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
-  if (wants_hints && !sample.empty())
-    scene.hints = find_hints(sample, location.hints, options.up, scene.notes, pool);
   scene.parts.format = parts->format;
   scene.parts.each = [read = parts->read, count = parts->count, used = sample.model, reach,
                       pool](const auto& take) {
@@ -69,6 +68,15 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
     }
     return dropped;
   };
+  const auto sample_all = [&] {
+    auto levels = view_sample(location, sample.model, context);
+    if (levels) return *std::move(levels);
+    return view_sample(location.format->size(location.files).gaussians,
+                       [&](const auto& take) { scene.parts.each(take); });
+  };
+  if (wants_hints && !sample.empty())
+    scene.hints =
+        find_hints(sample_all, location.hints, options.up, scene.notes, pool, options.keep_view);
   scene.sample = std::move(sample);
   return scene;
 }
