@@ -49,10 +49,9 @@ Sight best_inside(const std::vector<InnerView>& views, ViewJudge& judge) {
 }
 
 /// The usual direction of the first look: captures begin near the identity pose, which looks along
-/// +z; scenes with z up are by habit seen along +y. A unit vector at a right angle to `up`, towards
-/// the camera.
+/// +z. A unit vector at a right angle to `up`, towards the camera.
 glm::vec3 usual_front(const glm::vec3& up) {
-  const glm::vec3 front = std::abs(up.z) < 0.7f ? glm::vec3(0, 0, -1) : glm::vec3(0, -1, 0);
+  const glm::vec3 front(0, 0, -1);
   return glm::normalize(front - glm::dot(front, up) * up);
 }
 
@@ -108,15 +107,26 @@ Sight best_sight(const Inside& inside, const Content& content, const glm::vec3& 
   return best_unveiled(content, up, judge);
 }
 
-}  // namespace
+/// The quarter turns that take the axis nearest to `up` to -y, where most captures have it: z by
+/// one about x, because scenes with z up are by habit seen along +y. Half a turn about x more takes
+/// the opposite axes there. So a scene and its half turn have the same view, whatever the ties.
+glm::quat to_usual_axes(const glm::vec3& up) {
+  const glm::vec3 size = glm::abs(up);
+  const glm::quat half_about_x(0, 1, 0, 0), half_about_y(0, 0, 1, 0), none(1, 0, 0, 0);
+  const float quarter = std::sqrt(0.5f);
+  if (size.y >= std::max(size.x, size.z)) return up.y > 0.0f ? half_about_x : none;
+  if (size.z >= size.x)
+    return glm::quat(quarter, quarter, 0, 0) * (up.z > 0.0f ? none : half_about_x);
+  return glm::quat(quarter, 0, 0, -quarter) * (up.x > 0.0f ? none : half_about_y);
+}
 
-SceneHints estimate_hints(const GaussianCloud& cloud, const glm::vec3& up,
-                          std::shared_ptr<ThreadPool> pool) {
+SceneHints estimate_upright(const GaussianCloud& cloud, const glm::vec3& up,
+                            std::shared_ptr<ThreadPool> pool, float stands_for) {
   const Bounds core = robust_bounds(cloud).value_or(Bounds{glm::vec3(-1), glm::vec3(1)});
-  const VoxelGrid grid(cloud, with_surroundings(core));
+  const VoxelGrid grid(cloud, with_surroundings(core), stands_for);
   const Inside inside = look_inside(grid, core, up, *pool);
   const Content content = find_content(grid, core);
-  ViewJudge judge(cloud, core, std::move(pool));
+  ViewJudge judge(cloud, stands_for, core, std::move(pool));
   const Sight sight = best_sight(inside, content, up, judge);
 
   const auto& [min, max] = content.bounds;
@@ -130,6 +140,27 @@ SceneHints estimate_hints(const GaussianCloud& cloud, const glm::vec3& up,
   hints.scale = std::max(sight.scale, 1e-3f * radius);
   hints.near_z = std::min(0.2f, 0.02f * radius);
   hints.limits = {glm::min(min, start) - radius, glm::max(max, start) + radius};
+  return hints;
+}
+
+}  // namespace
+
+SceneHints estimate_hints(const GaussianCloud& cloud, const glm::vec3& up,
+                          std::shared_ptr<ThreadPool> pool, float stands_for) {
+  const glm::quat turn = to_usual_axes(up), back = glm::conjugate(turn);
+  if (turn.w == 1.0f) return estimate_upright(cloud, up, std::move(pool), stands_for);
+  glm::mat3 axes = glm::mat3_cast(turn);
+  for (int k = 0; k < 3; ++k) axes[k] = glm::round(axes[k]);
+  const glm::mat3 axes_back = glm::transpose(axes);
+  GaussianCloud turned = cloud;
+  for (glm::vec3& mean : turned.mean) mean = axes * mean;
+  for (glm::quat& rotation : turned.rotation) rotation = turn * rotation;
+  SceneHints hints = estimate_upright(turned, axes * up, std::move(pool), stands_for);
+  hints.up = up;
+  hints.start_pose = {axes_back * hints.start_pose.position, back * hints.start_pose.orientation};
+  hints.focus = axes_back * hints.focus;
+  const glm::vec3 one = axes_back * hints.limits.min, other = axes_back * hints.limits.max;
+  hints.limits = {glm::min(one, other), glm::max(one, other)};
   return hints;
 }
 

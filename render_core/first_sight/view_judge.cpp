@@ -19,10 +19,14 @@ namespace {
 
 constexpr std::size_t sample_size = std::size_t{1} << 18;
 
-/// The area that a Gaussian covers from its broad side. The few Gaussians of a sky, which are as
-/// large as all others together, count as large ones of the core.
-std::vector<float> weights_of(const GaussianCloud& cloud, const Bounds& core) {
-  const float largest = 1e-4f * glm::dot(core.max - core.min, core.max - core.min);
+/// The few Gaussians of a sky, which are as large as all others together, count as large ones of
+/// the core.
+float largest_area(const Bounds& core) {
+  return 1e-4f * glm::dot(core.max - core.min, core.max - core.min);
+}
+
+/// The area that a Gaussian covers from its broad side.
+std::vector<float> weights_of(const GaussianCloud& cloud, float largest) {
   std::vector<float> weights(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const glm::vec3& s = cloud.scale[i];
@@ -46,22 +50,26 @@ void append(const GaussianCloud& from, std::size_t i, float growth, GaussianClou
 }
 
 /// A sample with a chance in proportion to the weights, evenly spread over the order of the scene
-/// (systematic sampling, Madow 1949). Those that stand for others grow, so that the area is kept.
-GaussianCloud sample(const GaussianCloud& cloud, const Bounds& core) {
+/// (systematic sampling, Madow 1949). Those that stand for others grow, so that the area is kept,
+/// but not beyond the largest ones: these would fill free space.
+GaussianCloud sample(const GaussianCloud& cloud, const Bounds& core, float stands_for) {
   GaussianCloud small;
   small.model = cloud.model;
-  if (cloud.size() <= sample_size) {
+  if (cloud.size() <= sample_size && stands_for == 1.0f) {
     for (std::size_t i = 0; i < cloud.size(); ++i) append(cloud, i, 1.0f, small);
     return small;
   }
-  const std::vector<float> weights = weights_of(cloud, core);
+  const float largest = largest_area(core);
+  const std::vector<float> weights = weights_of(cloud, largest);
   const double step = std::accumulate(weights.begin(), weights.end(), 0.0) / sample_size;
   double left = 0.5 * step;  // to the next one that is taken
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     left -= static_cast<double>(weights[i]);
     if (left > 0.0) continue;
     left += step * (std::floor(-left / step) + 1.0);
-    append(cloud, i, std::sqrt(std::max(1.0f, static_cast<float>(step) / weights[i])), small);
+    const float grown = stands_for * std::max(1.0f, static_cast<float>(step) / weights[i]);
+    const float allowed = cloud.opacity[i] * largest / weights[i];
+    append(cloud, i, std::sqrt(std::max(1.0f, std::min(grown, allowed))), small);
   }
   return small;
 }
@@ -101,9 +109,9 @@ float symmetry_of(const std::vector<glm::vec3>& picture) {
 
 }  // namespace
 
-ViewJudge::ViewJudge(const GaussianCloud& cloud, const Bounds& core,
+ViewJudge::ViewJudge(const GaussianCloud& cloud, float stands_for, const Bounds& core,
                      std::shared_ptr<ThreadPool> pool)
-    : renderer_(make_renderer(std::make_shared<GaussianCloud>(sample(cloud, core)),
+    : renderer_(make_renderer(std::make_shared<GaussianCloud>(sample(cloud, core, stands_for)),
                               {.kind = RendererKind::cpu, .pool = std::move(pool)})
                     .renderer),
       view_(renderer_->make_view({})),

@@ -23,8 +23,9 @@ struct Judgement {
 /// Draws small pictures of a scene with the CPU core, from a sample of its Gaussians.
 class ViewJudge {
  public:
-  /// `core`: the bounds of most of the scene.
-  ViewJudge(const GaussianCloud& cloud, const Bounds& core, std::shared_ptr<ThreadPool> pool);
+  /// Each Gaussian stands for `stands_for` of the scene. `core`: the bounds of most of it.
+  ViewJudge(const GaussianCloud& cloud, float stands_for, const Bounds& core,
+            std::shared_ptr<ThreadPool> pool);
 
   /// `near` (world units): what is nearer than that in front of the camera is a veil.
   Judgement judge(const Pose& pose, float near);

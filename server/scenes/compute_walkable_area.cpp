@@ -25,25 +25,22 @@ constexpr std::uint64_t most_whole_gaussians = 4'000'000;  // of a scene that is
 
 std::string spec_of(const WalkableAreaSource& source) { return source.scene.given.string(); }
 
+/// Always the same representation, whatever of the scene is in memory.
 SceneByParts open(const WalkableAreaSource& source, const std::shared_ptr<ThreadPool>& pool,
                   const std::function<void()>& progress) {
+  constexpr std::uint64_t part_rows = 1'000'000;
   LoadOptions options;
   options.threads = pool->threads();
   options.progress = [&](double) { progress(); };
   const SceneLocation& scene = source.scene;
-  if (!source.tree.empty()) return by_parts(open_in_pages(source.tree, scene, options), pool);
   if (scene.is_in_pages()) return by_parts(open_in_pages(scene, options), pool);
-  constexpr std::uint64_t part_rows = 1'000'000;
-  if (scene.has_levels()) {
-    options.lod = source.levels.lod;
-    options.gaussian_budget = source.levels.gaussian_budget;
-  }
-  if (!options.lod && !options.gaussian_budget)
-    if (auto parted = scene_in_parts(scene, options, pool, part_rows, false))
-      return by_parts(*std::move(parted));
-  if (read_scene_size(scene, options).gaussians > most_whole_gaussians)
+  if (auto parted = scene_in_parts(scene, options, pool, part_rows, false))
+    return by_parts(*std::move(parted));
+  if (read_scene_size(scene, options).gaussians > most_whole_gaussians) {
+    if (!source.tree.empty()) return by_parts(open_in_pages(source.tree, scene, options), pool);
     throw InputError(spec_of(source), "", "has too many Gaussians to be read as a whole",
                      "with --cache-dir it gets a tree");
+  }
   options.first_view = false;
   return by_parts(load_scene(scene, options));
 }
@@ -121,9 +118,9 @@ std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
 }
 
 std::string walkable_area_name(const WalkableAreaSource& source) {
-  constexpr int version = 1;  // of what is found in a scene
+  constexpr int version = 2;  // of what is found in a scene
   const SceneLocation& scene = source.scene;
-  const std::string files = is_synthetic(spec_of(source)) ? "" : tree_name(scene, source.levels);
+  const std::string files = is_synthetic(spec_of(source)) ? "" : content_facts(scene);
   const std::string facts = fmt::format("{}\n{} {} {}\n{} {} {}\n{} {}", files, source.start.x,
                                         source.start.y, source.start.z, source.up.x, source.up.y,
                                         source.up.z, source.metres_per_unit, version);

@@ -15,8 +15,7 @@ namespace catgs {
 /// All that the walkable area of a scene depends on.
 struct WalkableAreaSource {
   SceneLocation scene;
-  std::filesystem::path tree;    // of a cache, read in place of the scene; empty: none
-  LoadOptions levels;            // of a scene that has some; only `lod` and `gaussian_budget` count
+  std::filesystem::path tree;    // of a cache, for scenes too large to be read as a whole
   std::filesystem::path beside;  // a .walk file of the author's; empty: nowhere
   glm::dvec3 start{0.0};         // where visits begin, in the coordinates of the scene's file
   glm::vec3 up{0.0f};            // of the scene as it is shown

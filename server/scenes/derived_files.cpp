@@ -113,20 +113,23 @@ std::string derived_name(const SceneLocation& scene, const std::string& facts,
                      hex_digest(facts, content_digits / 2), extension);
 }
 
-std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
-  constexpr int reading = 2;  // version of how scenes are read
+std::string content_facts(const SceneLocation& scene) {
   const std::optional<SplatModel> model = model_in_sidecar(scene.hints);
   try {
     const Content content = content_of(scene);
-    const std::string facts =
-        fmt::format("{}\n{} {} {}\n{} {}\n{} {} {}", scene.files.path.string(), content.files,
-                    content.bytes, content.newest.time_since_epoch().count(),
-                    levels.lod.value_or(-1), levels.gaussian_budget.value_or(0),
-                    TreeHeader::right_version, reading, model ? name_of(*model) : "");
-    return derived_name(scene, facts, tree_extension);
+    return fmt::format("{}\n{} {} {}\n{}", scene.files.path.string(), content.files, content.bytes,
+                       content.newest.time_since_epoch().count(), model ? name_of(*model) : "");
   } catch (const fs::filesystem_error& error) {
     throw InputError(scene.given.string(), {}, "cannot be read: " + error.code().message());
   }
+}
+
+std::string tree_name(const SceneLocation& scene, const LoadOptions& levels) {
+  constexpr int reading = 2;  // version of how scenes are read
+  const std::string facts =
+      fmt::format("{}\n{} {}\n{} {}", content_facts(scene), levels.lod.value_or(-1),
+                  levels.gaussian_budget.value_or(0), TreeHeader::right_version, reading);
+  return derived_name(scene, facts, tree_extension);
 }
 
 DerivedFiles::DerivedFiles(fs::path folder)

@@ -18,18 +18,22 @@ namespace catgs {
 /// first digest is of the scene's path, the second one of `facts`.
 std::string derived_name(const SceneLocation& scene, const std::string& facts,
                          std::string_view extension);
-/// That of a scene's tree. It changes with the scene's files (path, number, sizes, newest time),
-/// with the levels that are chosen of it, and with the format of trees. Sidecars do not count.
-/// Reads the names, sizes and times of the scene's files. Throws InputError.
+/// The facts that change with the scene's files (path, number, sizes, newest time) and its model.
+/// Of sidecars nothing else counts. Reads the names, sizes and times of the files. Throws
+/// InputError.
+std::string content_facts(const SceneLocation& scene);
+/// That of a scene's tree. It changes with content_facts(), with the levels that are chosen of the
+/// scene, and with the format of trees. Throws InputError.
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 
-/// The files in --cache-dir that the server has computed from scenes: trees, and small files, such
-/// as walkable areas and posters. Files of other names are left alone. Not thread-safe, but for the
-/// small files.
+/// The files in --cache-dir that the server has computed from scenes: trees, and small files:
+/// walkable areas, posters and first views. Files of other names are left alone. Not thread-safe,
+/// but for the small files.
 class DerivedFiles {
  public:
   static constexpr std::size_t most_walkable_areas = 256;
   static constexpr std::size_t most_posters = 10'000;          // about 1 GB
+  static constexpr std::size_t most_views = 10'000;            // about 40 MB, a block each
   static constexpr std::size_t most_small_files_of_scene = 4;  // as authors save it again and again
 
   /// Makes the folder if needed, and removes what builds that were killed and earlier versions have

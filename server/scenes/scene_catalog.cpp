@@ -148,7 +148,8 @@ std::vector<SceneLocation> locate_scenes(const ServerConfig& config) {
 std::shared_ptr<const SceneEntry> load_scene(
     const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
-    const RendererOptions& core, int threads, const std::function<void(double)>& progress) {
+    const RendererOptions& core, int threads, const std::function<void(double)>& progress,
+    const KeepView& keep) {
   const std::string spec = location.given.string();
   if (representation.tree.empty())
     log_info({.event = "scene_loading"}, "loading {}", spec);
@@ -159,6 +160,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
+  options.keep_view = keep;
   auto [tree, scene] = load(location, representation, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;

@@ -56,10 +56,12 @@ struct LoadedScene {
 
 /// Loads one scene in a representation and builds its renderer with the options and pool of `core`.
 /// `id_of` makes the id from the name. `threads` threads read the file. `progress` is called
-/// repeatedly and may throw to cancel. Throws InputError or UnusableTree.
+/// repeatedly and may throw to cancel. `keep`: as LoadOptions has it. Throws InputError or
+/// UnusableTree.
 std::shared_ptr<const SceneEntry> load_scene(
     const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
-    const RendererOptions& core, int threads, const std::function<void(double)>& progress = {});
+    const RendererOptions& core, int threads, const std::function<void(double)>& progress = {},
+    const KeepView& keep = {});
 
 }  // namespace catgs

@@ -40,12 +40,10 @@ const std::string& renderer_text(const SceneIndex& index) {
   return index.records().at(index.preferred()).entry->renderer_text;
 }
 
-WalkableAreaSource source_of(const SceneRecord& record, const SceneTrees& trees,
-                             const ServerConfig& config) {
+WalkableAreaSource source_of(const SceneRecord& record, const SceneTrees& trees) {
   WalkableAreaSource source = walkable_area_source(record.found.location, record.entry->facts);
   if (source.scene.format == nullptr) return source;  // procedural
   if (trees.ready(record.found)) source.tree = trees.representation_of(record.found)->tree;
-  source.levels = chosen_levels(config);
   source.beside = record.entry->sidecar;
   if (!source.beside.empty()) source.beside.replace_extension(".walk");
   return source;
@@ -159,13 +157,13 @@ void SceneLibrary::want_walkable_area(const std::string& id) {
         walkable_areas_.busy())
       return;
     if (record->walkable_area_retry_at && clock_() < *record->walkable_area_retry_at) return;
-    const WalkableAreaSource source = source_of(*record, trees_, config_);
+    const WalkableAreaSource source = source_of(*record, trees_);
     walkable_areas_.find(
         id, source, [this, id, source, changed = record->found.changed](const auto& walkable_area) {
           SceneRecord* const found_for = index_.find(id);
           if (!found_for || !found_for->entry || found_for->walkable_area ||
               found_for->found.changed != changed ||
-              !same_walkable_area(source, source_of(*found_for, trees_, config_)))
+              !same_walkable_area(source, source_of(*found_for, trees_)))
             return;
           found_for->walkable_area = walkable_area;
           if (!walkable_area) found_for->walkable_area_retry_at = clock_() + seek_again_after;
@@ -180,9 +178,9 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
   if (record->former && record->former->renderer == entry->renderer)
     entry = redrawn(*entry, *record->entry);
   if (record->entry->renderer != entry->renderer) return;
-  const WalkableAreaSource before = source_of(*record, trees_, config_);
+  const WalkableAreaSource before = source_of(*record, trees_);
   record->entry = unleased(std::move(entry), record->entry->renderer);
-  if (!record->outdated && !same_walkable_area(before, source_of(*record, trees_, config_)))
+  if (!record->outdated && !same_walkable_area(before, source_of(*record, trees_)))
     record->walkable_area.reset();
   memory_.publish();
 }

@@ -12,6 +12,7 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/tree/page_pools.h"
 #include "server/base/log_event.h"
+#include "server/scenes/kept_views.h"
 #include "server/scenes/tours.h"
 
 namespace catgs {
@@ -23,18 +24,13 @@ constexpr std::size_t most_poster_bytes = 1 << 20;  // in --cache-dir
 /// Throws InputError.
 std::string poster_name(const FoundScene& found, const SceneRepresentation& representation,
                         const ServerConfig& config) {
-  constexpr int version = 1;  // of how posters are drawn
+  constexpr int version = 2;  // of how posters are drawn
   const SceneLocation& scene = found.location;
-  std::string facts = fmt::format(
+  const std::string facts = fmt::format(
       "{}\n{} {} {}\n{}", found.tree.empty() ? tree_name(scene, chosen_levels(config)) : found.tree,
       version, config.up, representation.most_gaussians,
       sidecar_text(scene.hints.sidecar).value_or(""));
-  for (const auto& file : {scene.hints.cameras, scene.hints.transforms}) {
-    std::error_code none;
-    const auto written = std::filesystem::last_write_time(file, none);
-    facts += fmt::format("\n{}", none ? 0 : written.time_since_epoch().count());
-  }
-  return derived_name(scene, facts, ".jpg");
+  return derived_name(scene, facts + camera_facts(scene.hints), ".jpg");
 }
 
 void check_jpeg(const ByteSource& file) {
@@ -73,7 +69,7 @@ std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found)
   const auto load_as = [&](const SceneRepresentation& representation) {
     return load_scene(
         found.location, representation, [&](const auto& name) { return ids_.id_of(spec, name); },
-        config_, core_, core_.pool->threads());
+        config_, core_, core_.pool->threads(), {}, keep_view(files_, found.location, config_));
   };
   try {
     if (trees_.ready(found)) return load_as(*trees_.representation_of(found));
@@ -111,7 +107,8 @@ LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneRepresentat
     const int threads = std::max(1, core_.pool->threads() / 2);
     return {load_scene(
         found.location, representation, [&](const auto&) { return found.id; }, config_, core_,
-        threads, [&](double) { throw_if_stopped(stop); })};
+        threads, [&](double) { throw_if_stopped(stop); },
+        keep_view(files_, found.location, config_))};
   } catch (const UnusableTree& error) {
     return {nullptr, error.what(), true};
   } catch (const std::exception& error) {

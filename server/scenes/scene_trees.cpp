@@ -8,8 +8,10 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/math/axis_name.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "server/base/log_event.h"
+#include "server/scenes/kept_views.h"
 #include "server/scenes/tree_builder.h"
 
 namespace catgs {
@@ -117,6 +119,8 @@ void SceneTrees::build(const FoundScene& scene, const std::function<void(double)
   build.scene = scene.location;
   build.out = cache_->path_of(scene.tree);
   if (scene.location.has_levels()) build.levels = chosen_levels(config_);
+  build.up = axis_named(config_.up);
+  build.keep_view = keep_view(cache_, scene.location, config_);
   // A quarter of the memory for scenes.
   build.memory_bytes = std::clamp(tree_memory(config_) / 2, least_build_bytes, most_build_bytes);
   build.threads = threads_;

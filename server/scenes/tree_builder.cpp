@@ -16,6 +16,9 @@ void build_whole(const TreeBuild& build, const std::shared_ptr<ThreadPool>& pool
                  const std::function<void(double)>& progress) {
   constexpr double loaded = 0.3;  // of the time, about
   LoadOptions options = build.levels;
+  options.up = build.up;
+  options.keep_view = build.keep_view;
+  options.first_view = build.keep_view != nullptr;
   options.threads = build.threads;
   options.progress = [&](double fraction) { progress(loaded * fraction); };
   const Scene scene = load_scene(build.scene, options);
@@ -35,7 +38,13 @@ void build_scene_tree(const TreeBuild& build, const std::function<void(double)>&
   const auto pool = std::make_shared<ThreadPool>(build.threads);
   progress(0.0);
   const bool all_levels = !build.levels.lod && !build.levels.gaussian_budget;
-  auto parted = all_levels ? scene_in_parts(build.scene, {}, pool, part_rows, false) : std::nullopt;
+  LoadOptions options;
+  options.up = build.up;
+  options.keep_view = build.keep_view;
+  // That of levels needs no more than a few of them, whenever it is asked for.
+  const bool first_view = build.keep_view != nullptr && !build.scene.has_levels();
+  auto parted =
+      all_levels ? scene_in_parts(build.scene, options, pool, part_rows, first_view) : std::nullopt;
   if (!parted) return build_whole(build, pool, progress);
   // Reading a large scene takes minutes, and build_tree() reports only when it is through.
   double reported = 0.0;

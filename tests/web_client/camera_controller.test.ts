@@ -7,6 +7,7 @@ import {
   forward,
   identity,
   length,
+  look_at,
   multiply,
   normalize,
   right,
@@ -255,11 +256,34 @@ describe('any mode', () => {
 
   it('flips up and down in place', () => {
     const made = camera('fly');
-    made.turn_up(Math.PI);
+    made.turn_over();
     expect_vec(view_of(made), forward);
     expect_vec(rotate(made.pose.orientation, down), [0, -1, 0]);
+    expect_vec(made.pose.position, scene.start_pose.position);
     hold(made, { up: 1 });
     expect(made.pose.position[1]).toBeGreaterThan(0.1);
+  });
+
+  it('flips a scene that it sees from above, and sees it from above', () => {
+    const position: Vec3 = [0, -2, -2];
+    const start_pose = { position, orientation: look_at(position, [0, 0, 0], [0, -1, 0]) };
+    const made = camera('orbit', { start_pose, focus: [0, 0, 0] });
+    const expect_flipped = (): void => {
+      expect_vec(made.up, [0, 1, 0]);
+      expect_vec(made.pose.position, [0, 2, -2]);
+      expect_vec(view_of(made), normalize([0, -1, 1], forward));
+      expect(dot(rotate(made.pose.orientation, down), made.up)).toBeLessThan(0);
+      expect(dot(rotate(made.pose.orientation, right), made.up)).toBeCloseTo(0, 6);
+    };
+    made.turn_over();
+    expect_flipped();
+    gesture(made, { kind: 'look', dx: 0.3, dy: 0 });
+    made.reset();
+    expect_flipped();
+    expect_vec(made.scene!.up, [0, 1, 0]);
+    made.turn_over();
+    expect_vec(made.up, [0, -1, 0]);
+    expect_vec(made.pose.position, position);
   });
 
   it('returns to the start', () => {

@@ -233,6 +233,7 @@ describe('a shared link', () => {
     const address = share_address('https://host/x/?author&presenter=2d#token=s3cret', 'city', {
       eye,
       mode: 'walk',
+      up: [0, 0.6, -0.8],
       tour_index: 1,
       stop_index: 3,
     });
@@ -241,6 +242,7 @@ describe('a shared link', () => {
     expect(address).toMatch(/^https:\/\/host\/x\/\?scene=city#at=1\.25,-2,300\.5,/);
     const shared = read_shared(address);
     expect(shared).toMatchObject({ mode: 'walk', tour_index: 1, stop_index: 3 });
+    expect_vec(shared.up!, [0, 0.6, -0.8]);
     expect_vec(shared.eye!.position, eye.position);
     expect(angle_between(shared.eye!.orientation, eye.orientation)).toBeLessThan(1e-3);
     expect(shared.eye!.fov_y_rad).toBeCloseTo(1, 4);
@@ -261,7 +263,7 @@ describe('a shared link', () => {
   );
 
   it('knows modes and stops that there are', () => {
-    const shared = read_shared('https://host/#mode=swim&stop=0&tour=-1');
+    const shared = read_shared('https://host/#mode=swim&stop=0&tour=-1&up=1,1,0');
     expect(new Set(Object.values(shared))).toEqual(new Set([undefined]));
   });
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "render_core/base/even_sample.h"
+
 namespace catgs {
 
 namespace {
@@ -28,10 +30,11 @@ float weighted_quantile(const std::vector<WeightedValue>& values, double total, 
 
 std::optional<Bounds> robust_bounds(const GaussianCloud& cloud, float tail) {
   assert(tail >= 0.0f && tail < 0.5f);
-  const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
+  const EvenSample even(cloud.size(), max_sample);
   std::vector<std::size_t> sample;
   double total = 0.0;
-  for (std::size_t i = 0; i < cloud.size(); i += step) {
+  for (std::size_t k = 0; k < even.size(); ++k) {
+    const std::size_t i = even[k];
     const glm::vec3& m = cloud.mean[i];
     const bool usable = std::isfinite(m.x) && std::isfinite(m.y) && std::isfinite(m.z) &&
                         cloud.opacity[i] > 0.0f && cloud.opacity[i] <= 1.0f;

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/scene/clusters.h"
 
 namespace catgs {
@@ -42,21 +43,14 @@ Approach approach(const glm::vec3& origin, const glm::vec3& direction, const glm
 }  // namespace
 
 SurfacePoints::SurfacePoints(const GaussianCloud& cloud, ThreadPool& pool, std::size_t max_points) {
-  const std::size_t step = std::max<std::size_t>(
-      1, (cloud.size() + max_points - 1) / std::max<std::size_t>(1, max_points));
-  const float growth = std::sqrt(static_cast<float>(step));  // of discs that stand for `step`
-  // Picks one of each `step`, at a varying position, because many files are ordered row by row.
-  std::vector<std::size_t> chosen;
-  std::vector<glm::vec3> centres;
-  std::uint32_t lot = 1;
-  for (std::size_t first = 0; first < cloud.size(); first += step) {
-    lot = lot * 1664525u + 1013904223u;
-    chosen.push_back(std::min(first + (lot >> 8) % step, cloud.size() - 1));
-    centres.push_back(cloud.mean[chosen.back()]);
-  }
-  points_.reserve(chosen.size());
+  const EvenSample sample(cloud.size(), std::max<std::size_t>(1, max_points));
+  const float growth =
+      std::sqrt(static_cast<float>(sample.step()));  // of discs that stand for more
+  std::vector<glm::vec3> centres(sample.size());
+  for (std::size_t k = 0; k < centres.size(); ++k) centres[k] = cloud.mean[sample[k]];
+  points_.reserve(centres.size());
   for (const std::uint32_t k : morton_order(centres, pool)) {
-    const std::size_t i = chosen[k];
+    const std::size_t i = sample[k];
     points_.push_back({centres[k], growth * disc_radius(cloud.scale[i]), cloud.opacity[i]});
   }
   clusters_.resize(clusters_of(points_.size()));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -13,7 +14,9 @@
 #include <glm/vec2.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/math/look_at.h"
+#include "render_core/scene/activations.h"
 #include "render_core/scene/analysis/robust_bounds.h"
 
 namespace catgs {
@@ -24,29 +27,40 @@ constexpr float horizontal = 0.94f,
                 vertical = 0.17f;        // normals of floors and walls: 20, 80 degrees
 constexpr float smallest_floor = 0.25f;  // of floor_size(); less is the side of a thing
 
-/// A flat Gaussian: a small piece of some surface.
+/// A Gaussian as a small piece of some surface.
 struct Facet {
   glm::vec3 place, normal;
-  float area;
+  float area;       // that it stands for; it counts as no more than a large one of the scene's
+  float size;       // its middle standard deviation
+  float luminance;  // 0…1
+  bool is_flat;     // else its normal says nothing
 };
 
-std::vector<Facet> sample_facets(const GaussianCloud& cloud, const Bounds& bounds) {
+std::vector<Facet> sample_facets(const GaussianCloud& cloud, float stands_for,
+                                 const Bounds& bounds) {
   constexpr std::size_t max_facets = std::size_t{1} << 16;
   constexpr float flat = 0.4f;  // smallest to middle standard deviation
+  constexpr float two_pi = 6.2831853f;
   // Some Gaussians of a background are as large as the scene and would outvote it.
-  const float largest = 0.02f * glm::distance(bounds.min, bounds.max);
-  const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_facets - 1) / max_facets);
+  const float largest = 0.005f * glm::distance(bounds.min, bounds.max);
+  const EvenSample sample(cloud.size(), max_facets);
   std::vector<Facet> facets;
-  for (std::size_t i = 0; i < cloud.size(); i += step) {
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const std::size_t i = sample[k];
     const glm::vec3& place = cloud.mean[i];
     if (glm::any(glm::lessThan(place, bounds.min)) || glm::any(glm::greaterThan(place, bounds.max)))
       continue;
     const glm::vec3& scale = cloud.scale[i];
     std::array<int, 3> axes = {0, 1, 2};
     std::ranges::sort(axes, {}, [&](int a) { return scale[a]; });
-    if (scale[axes[0]] > flat * scale[axes[1]]) continue;
     const float area = std::min(scale[axes[1]], largest) * std::min(scale[axes[2]], largest);
-    facets.push_back({place, glm::mat3_cast(cloud.rotation[i])[axes[0]], cloud.opacity[i] * area});
+    const glm::vec3 colour = glm::clamp(0.5f + sh_c0 * cloud.sh_of(i)[0], 0.0f, 1.0f);
+    facets.push_back(
+        {place, glm::mat3_cast(cloud.rotation[i])[axes[0]],
+         two_pi * stands_for * static_cast<float>(sample.step()) * cloud.opacity[i] * area,
+         std::sqrt(scale[axes[1]] * scale[axes[2]]),
+         glm::dot(colour, glm::vec3(0.2126f, 0.7152f, 0.0722f)),  // BT.709
+         scale[axes[0]] <= flat * scale[axes[1]]});
   }
   return facets;
 }
@@ -57,7 +71,8 @@ std::optional<glm::vec3> peak_near(const std::vector<Facet>& facets, glm::vec3 a
     glm::vec3 sum(0.0f);
     for (const Facet& facet : facets) {
       const float along = glm::dot(facet.normal, axis);
-      if (std::abs(along) > within) sum += std::copysign(facet.area, along) * facet.normal;
+      if (facet.is_flat && std::abs(along) > within)
+        sum += std::copysign(facet.area, along) * facet.normal;
     }
     if (!(glm::length(sum) > 0.0f)) return std::nullopt;
     axis = glm::normalize(sum);
@@ -65,78 +80,179 @@ std::optional<glm::vec3> peak_near(const std::vector<Facet>& facets, glm::vec3 a
   return axis;
 }
 
-/// Where the share `share` of sorted values lies.
-float quantile(const std::vector<float>& sorted, float share) {
-  return sorted[static_cast<std::size_t>(share * static_cast<float>(sorted.size() - 1))];
+/// The facets in a box around most of their area, with two axes in the plan and one up.
+struct UprightBox {
+  glm::mat3 axes;
+  glm::vec3 low{0.0f}, extent{0.0f};
+
+  UprightBox(const std::vector<Facet>& facets, const glm::vec3& up)
+      : axes(perpendicular(up), glm::cross(up, perpendicular(up)), up) {
+    for (int k = 0; k < 3; ++k) measure(facets, k);
+  }
+
+  /// By area: a coarser level of detail has fewer Gaussians, but covers the same.
+  void measure(const std::vector<Facet>& facets, int k) {
+    constexpr double tail = 0.02;
+    constexpr std::size_t bins = 1024;
+    const auto place = [&](const Facet& f) { return glm::dot(f.place, axes[k]); };
+    const auto [first, last] = std::ranges::minmax(facets, {}, place);
+    const float least = place(first), bin = (place(last) - least) / bins;
+    std::array<double, bins + 1> area{};
+    for (const Facet& f : facets)
+      area[bin > 0.0f ? static_cast<std::size_t>((place(f) - least) / bin) : 0] +=
+          static_cast<double>(f.area);
+    std::partial_sum(area.begin(), area.end(), area.begin());
+    const auto quantile = [&](double share) {
+      const auto at = std::ranges::lower_bound(area, share * area.back()) - area.begin();
+      return least + bin * (static_cast<float>(at) + 0.5f);
+    };
+    low[k] = quantile(tail);
+    extent[k] = std::max(quantile(1.0 - tail) - low[k], 1e-6f);
+  }
+
+  /// 0…1 in the box.
+  [[nodiscard]] glm::vec3 place_of(const Facet& facet) const {
+    return (facet.place * axes - low) / extent;
+  }
+};
+
+constexpr int levels = 64;  // of heights
+int level_of(float height) {
+  return static_cast<int>(std::clamp(height * levels, 0.0f, levels - 1.0f));
 }
 
-/// Area of the floor that the facets form at a right angle to `up`, relative to the largest side
-/// of the box around them. A floor lies in the lower part and spans the plan: facades and sides of
-/// things do so too, but are smaller.
-float floor_size(const std::vector<Facet>& facets, const glm::vec3& up) {
-  constexpr int plan = 20, levels = 64;
-  constexpr float lower_part = 0.4f;
-  const glm::vec3 a = perpendicular(up), b = glm::cross(up, a);
-  glm::vec3 low, extent;
-  std::vector<float> values(facets.size());
-  const glm::mat3 axes(a, b, up);
-  for (int k = 0; k < 3; ++k) {
-    std::ranges::transform(facets, values.begin(),
-                           [&](const Facet& f) { return glm::dot(f.place, axes[k]); });
-    std::ranges::sort(values);
-    low[k] = quantile(values, 0.02f);
-    extent[k] = std::max(quantile(values, 0.98f) - low[k], 1e-6f);
-  }
-  const auto place = [&](const Facet& f) {  // 0…1 in the box
-    return (glm::vec3(glm::dot(f.place, a), glm::dot(f.place, b), glm::dot(f.place, up)) - low) /
-           extent;
+/// The share of the plan that a floor covers, where that is a level in the lower part; or the same
+/// of a ceiling.
+float covered(const std::vector<Facet>& facets, const UprightBox& box, bool below) {
+  constexpr int plan = 20;
+  constexpr float outer_part = 0.4f, occupied = 0.1f;  // optical depth
+  const auto is_level = [&](const Facet& f) {
+    return f.is_flat && std::abs(glm::dot(f.normal, box.axes[2])) > horizontal;
+  };
+  const auto height_of = [&](const glm::vec3& place) {  // from the outside
+    return level_of(below ? place.z : 1.0f - place.z);
   };
   std::array<float, levels> area{};
-  const auto level_of = [&](float height) {
-    return static_cast<int>(std::clamp(height * levels, 0.0f, levels - 1.0f));
-  };
   for (const Facet& f : facets)
-    if (std::abs(glm::dot(f.normal, up)) > horizontal)
-      area[static_cast<std::size_t>(level_of(place(f).z))] += f.area;
-  const auto lowest_levels = area.begin() + static_cast<int>(lower_part * levels);
-  const int floor = static_cast<int>(std::max_element(area.begin(), lowest_levels) - area.begin());
-  std::vector<char> covered(plan * plan);
+    if (is_level(f)) area[static_cast<std::size_t>(height_of(box.place_of(f)))] += f.area;
+  const auto outer = area.begin() + static_cast<int>(outer_part * levels);
+  const int floor = static_cast<int>(std::max_element(area.begin(), outer) - area.begin());
+  std::vector<float> cells(plan * plan);
   for (const Facet& f : facets) {
-    const glm::vec3 p = place(f);
-    if (std::abs(glm::dot(f.normal, up)) < horizontal || std::abs(level_of(p.z) - floor) > 1)
-      continue;
+    const glm::vec3 p = box.place_of(f);
+    if (!is_level(f) || std::abs(height_of(p) - floor) > 1) continue;
     if (!(p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f)) continue;
     const glm::ivec2 cell = glm::min(glm::ivec2(static_cast<float>(plan) * glm::vec2(p)), plan - 1);
-    covered[static_cast<std::size_t>(cell.y * plan + cell.x)] = 1;
+    cells[static_cast<std::size_t>(cell.y * plan + cell.x)] += f.area;
   }
-  const float share = static_cast<float>(std::ranges::count(covered, 1)) / (plan * plan);
-  const float smallest = std::min({extent.x, extent.y, extent.z});
-  return share * smallest / extent.z;
+  const float full = occupied * box.extent.x * box.extent.y / (plan * plan);
+  return static_cast<float>(std::ranges::count_if(cells, [&](float a) { return a > full; })) /
+         (plan * plan);
+}
+
+/// Correlation of two values over facets.
+class Correlation {
+ public:
+  void add(double x, double y, double weight) {
+    w_ += weight;
+    x_ += weight * x;
+    y_ += weight * y;
+    xx_ += weight * x * x;
+    yy_ += weight * y * y;
+    xy_ += weight * x * y;
+  }
+  [[nodiscard]] double mean_x() const { return w_ > 0.0 ? x_ / w_ : 0.0; }
+  [[nodiscard]] double value() const {
+    const double spread = (w_ * xx_ - x_ * x_) * (w_ * yy_ - y_ * y_);
+    return spread > 1e-12 * w_ * w_ ? (w_ * xy_ - x_ * y_) / std::sqrt(spread) : 0.0;
+  }
+
+ private:
+  double w_ = 0.0, x_ = 0.0, y_ = 0.0, xx_ = 0.0, yy_ = 0.0, xy_ = 0.0;
+};
+
+/// How far the content says that up is not down, -1…1 about: things stand on a floor, what is low
+/// is seen from near and has detail, and light comes from above. It changes its sign with `up`.
+float uprightness(const std::vector<Facet>& facets, const UprightBox& box, float floor,
+                  float ceiling) {
+  constexpr float edge = 0.05f;   // floors and ceilings may bound the box
+  constexpr float fine = 0.004f;  // of the height: beyond this, a facet counts as no more
+  const float finest_area = fine * fine * box.extent.z * box.extent.z;
+  Correlation things, detail, light;
+  for (const Facet& f : facets) {
+    const glm::vec3 p = box.place_of(f);
+    if (glm::any(glm::greaterThan(glm::abs(p - 0.5f), glm::vec3(0.5f + edge)))) continue;
+    const double height = static_cast<double>(2.0f * p.z - 1.0f),
+                 area = static_cast<double>(f.area);
+    const float own = f.size * f.size;
+    things.add(height, 0.0,
+               area * static_cast<double>(std::min(1.0f, finest_area / std::max(own, 1e-30f))));
+    detail.add(height, std::log(static_cast<double>(f.size) + 1e-30), 1.0);
+    light.add(height, static_cast<double>(f.luminance), area);
+  }
+  // Rooms have both. What a floor and a ceiling of one room lack in size means little.
+  const float open = (floor - ceiling) / std::max(floor + ceiling, 0.02f);
+  return 0.5f * open * std::abs(open) +
+         static_cast<float>(detail.value() + light.value() - things.mean_x());
+}
+
+/// How well the content stands upright on an axis.
+struct Upright {
+  float floor = 0.0f;  // or ceiling; a facade or the side of a thing is smaller
+  float sense = 0.0f;  // > 0: it is up rather than down
+};
+
+Upright judge(const std::vector<Facet>& facets, const glm::vec3& up) {
+  const UprightBox box(facets, up);
+  const float floor = covered(facets, box, true), ceiling = covered(facets, box, false);
+  const float smallest = std::min({box.extent.x, box.extent.y, box.extent.z});
+  return {std::max(floor, ceiling) * smallest / box.extent.z,
+          uprightness(facets, box, floor, ceiling)};
 }
 
 /// How usual it is that a scene has this up: captures of COLMAP have y down, surveys have z up,
 /// some tools turn y up.
 float habit(const glm::vec3& up) {
   return std::max(
-      {0.2f, -up.y * std::abs(up.y), 0.6f * up.z * std::abs(up.z), 0.4f * up.y * std::abs(up.y)});
+      {0.3f, -up.y * std::abs(up.y), 0.6f * up.z * std::abs(up.z), 0.4f * up.y * std::abs(up.y)});
 }
 
-/// The axis above the largest floor.
-glm::vec3 above_largest_floor(const std::vector<Facet>& facets) {
+/// The axis on which the largest floor lies, in the sense that the content tells. Without a floor
+/// the usual axis.
+glm::vec3 upright_axis(const std::vector<Facet>& facets) {
+  if (facets.empty()) return usual_up;
+  constexpr float trust = 2.5f, most = 0.6f;
+  const auto factor = [&](float sense) { return std::exp(trust * std::clamp(sense, -most, most)); };
   glm::vec3 best = usual_up;
-  float best_score = smallest_floor;
-  for (int x = -1; x <= 1; ++x)
-    for (int y = -1; y <= 1; ++y)
-      for (int z = -1; z <= 1; ++z) {
-        if (x == 0 && y == 0 && z == 0) continue;
-        const auto axis = peak_near(facets, glm::normalize(glm::vec3(x, y, z)));
-        if (!axis) continue;
-        const float score = habit(*axis) * floor_size(facets, *axis);
-        if (score > best_score) {
-          best_score = score;
-          best = *axis;
-        }
-      }
+  float best_score = 0.0f;
+  const auto consider = [&](const glm::vec3& axis, float floor, float sense) {
+    const float score = habit(axis) * floor * factor(sense);
+    if (score <= best_score) return;
+    best_score = score;
+    best = axis;
+  };
+  std::vector<glm::vec3> axes;
+  const auto add = [&](const std::optional<glm::vec3>& axis) {
+    const auto same = [&](const glm::vec3& other) {
+      return std::abs(glm::dot(*axis, other)) > 0.999f;
+    };
+    if (axis && std::ranges::none_of(axes, same)) axes.push_back(*axis);
+  };
+  // Most scenes stand on an axis of their file.
+  for (int k = 0; k < 3; ++k) add(glm::mat3(1.0f)[k]);
+  for (int k = 0; k < 13; ++k)  // the half of 26 directions that is not opposite to the others
+    add(peak_near(facets, glm::normalize(glm::vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1))));
+  for (const glm::vec3& axis : axes) {
+    const auto [floor, sense] = judge(facets, axis);
+    if (floor < smallest_floor) continue;
+    for (const float sign : {1.0f, -1.0f})
+      if (habit(sign * axis) * floor * std::max(1.0f, factor(sign * sense)) > smallest_floor)
+        consider(sign * axis, floor, sign * sense);
+  }
+  if (best_score > 0.0f) return best;
+  const float sense = judge(facets, usual_up).sense;
+  consider(usual_up, 1.0f, sense);
+  consider(-usual_up, 1.0f, -sense);
   return best;
 }
 
@@ -161,11 +277,13 @@ glm::vec3 level(const glm::vec3& guess, const std::vector<Facet>& facets,
     from_cameras += glm::outerProduct(right, right) / static_cast<float>(cameras.size());
   }
   float area = 1e-30f;
-  for (const Facet& facet : facets) area += facet.area;
+  for (const Facet& facet : facets)
+    if (facet.is_flat) area += facet.area;
   glm::vec3 up = guess;
   for (int round = 0; round < 4; ++round) {
     glm::mat3 form = from_cameras + glm::mat3(pull);
     for (const Facet& facet : facets) {
+      if (!facet.is_flat) continue;
       const float along = std::abs(glm::dot(facet.normal, up));
       const glm::mat3 square = glm::outerProduct(facet.normal, facet.normal);
       const float weight = trust * facet.area / area;
@@ -179,17 +297,18 @@ glm::vec3 level(const glm::vec3& guess, const std::vector<Facet>& facets,
 
 }  // namespace
 
-glm::vec3 find_up(const GaussianCloud& cloud, std::span<const Pose> cameras) {
+glm::vec3 find_up(const GaussianCloud& cloud, std::span<const Pose> cameras, float stands_for) {
   std::vector<Facet> facets;
-  if (const auto bounds = robust_bounds(cloud, 0.01f)) facets = sample_facets(cloud, *bounds);
+  if (const auto bounds = robust_bounds(cloud, 0.01f))
+    facets = sample_facets(cloud, stands_for, *bounds);
   const glm::vec3 held = mean_up(cameras);
   if (glm::length(held) < 0.2f) cameras = {};  // none, or those of a drone that looks straight down
   const glm::vec3 guess =
-      cameras.empty() ? above_largest_floor(facets) : level(glm::normalize(held), {}, cameras);
+      cameras.empty() ? upright_axis(facets) : level(glm::normalize(held), {}, cameras);
   // The surfaces of a thing without a floor are level by chance only.
   const auto axis = peak_near(facets, guess);
   const bool has_floor =
-      axis && glm::dot(*axis, guess) > horizontal && floor_size(facets, guess) > smallest_floor;
+      axis && glm::dot(*axis, guess) > horizontal && judge(facets, guess).floor > smallest_floor;
   return has_floor ? level(guess, facets, cameras) : guess;
 }
 

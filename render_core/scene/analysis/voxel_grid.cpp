@@ -12,13 +12,13 @@ namespace catgs {
 
 namespace {
 
-constexpr std::size_t max_sample = std::size_t{1} << 20;
 constexpr float max_cells = 2097152.0f;
 constexpr float two_pi = 6.2831853f;
 
 }  // namespace
 
-VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const Bounds& box) : corner_(box.min) {
+VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const Bounds& box, float stands_for)
+    : corner_(box.min) {
   // A flat box keeps some height, so that the number of cells stays bounded.
   const glm::vec3 extent = box.max - box.min;
   const float longest = std::max({extent.x, extent.y, extent.z, 1e-6f});
@@ -26,9 +26,7 @@ VoxelGrid::VoxelGrid(const GaussianCloud& cloud, const Bounds& box) : corner_(bo
   cell_size_ = std::cbrt(sides.x * sides.y * sides.z / max_cells);
   size_ = glm::ivec3(glm::ceil(sides / cell_size_));
   depth_.resize(index_of({0, 0, size_.z}));
-  const std::size_t step = std::max<std::size_t>(1, (cloud.size() + max_sample - 1) / max_sample);
-  for (std::size_t i = 0; i < cloud.size(); i += step)
-    add_gaussian(cloud, i, static_cast<float>(step));
+  for (std::size_t i = 0; i < cloud.size(); ++i) add_gaussian(cloud, i, stands_for);
 }
 
 /// A Gaussian stops opacity * 2 pi s t of the light (its integral over the plane of its two larger

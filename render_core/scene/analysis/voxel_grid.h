@@ -17,8 +17,8 @@ class VoxelGrid {
  public:
   static constexpr float never = std::numeric_limits<float>::infinity();
 
-  /// At most about 2^21 cells. Large scenes are judged by an even sample.
-  VoxelGrid(const GaussianCloud& cloud, const Bounds& box);
+  /// At most about 2^21 cells. Each Gaussian stands for `stands_for` of the scene.
+  VoxelGrid(const GaussianCloud& cloud, const Bounds& box, float stands_for = 1.0f);
 
   [[nodiscard]] float cell_size() const { return cell_size_; }
   [[nodiscard]] const glm::ivec3& size() const { return size_; }

@@ -13,6 +13,7 @@
 #include "render_core/math/look_at.h"
 #include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/files/hints.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/camera_list.h"
 
 namespace catgs {
@@ -96,14 +97,23 @@ void use_orbit(const OrbitLimits& orbit, SceneHints& hints) {
   hints.source += ", with the orbit of its file";
 }
 
+/// The same hints about another origin.
+void count_from(const glm::dvec3& origin, SceneHints& hints) {
+  const glm::vec3 by(hints.origin - origin);
+  for (glm::vec3* place :
+       {&hints.start_pose.position, &hints.limits.min, &hints.limits.max, &hints.focus})
+    *place += by;
+  hints.origin = origin;
+}
+
+}  // namespace
+
 std::optional<Sidecar> sidecar_at(const HintFiles& files) {
   std::error_code error;
   if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error))
     return std::nullopt;
   return read_sidecar(FileSource(files.sidecar), files.origin);
 }
-
-}  // namespace
 
 bool tell_anything(const HintFiles& files) {
   return files.orbit.has_value() ||
@@ -126,9 +136,9 @@ void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, 
     notes.emplace_back("its model is 2dgs, and its discs are drawn as flat Gaussians");
 }
 
-SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+SceneHints find_hints(const std::function<ViewSample()>& sample, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
-                      std::shared_ptr<ThreadPool> pool) {
+                      std::shared_ptr<ThreadPool> pool, const KeepView& keep) {
   const std::optional<Sidecar> sidecar = sidecar_at(files);
   if (sidecar && sidecar->unknown)
     notes.push_back(
@@ -137,14 +147,20 @@ SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
 
   std::optional<glm::vec3> told = sidecar ? sidecar->up : std::nullopt;
   if (!told) told = up;
-  SceneHints hints =
-      estimate_hints(cloud, told ? *told : find_up(cloud, cameras.poses), std::move(pool));
+  const auto estimate = [&] {
+    const auto [cloud, stands_for] = sample();
+    const glm::vec3 found = told ? *told : find_up(cloud, cameras.poses, stands_for);
+    SceneHints hints = estimate_hints(cloud, found, pool, stands_for);
+    hints.origin = files.origin;
+    return hints;
+  };
+  SceneHints hints = keep ? keep(estimate) : estimate();
+  count_from(files.origin, hints);
   if (!cameras.poses.empty())
     use_cameras(cameras, hints);
   else if (files.orbit)
     use_orbit(*files.orbit, hints);
   if (sidecar) use_sidecar(*sidecar, files.sidecar.filename().string(), hints);
-  hints.origin = files.origin;
   return hints;
 }
 

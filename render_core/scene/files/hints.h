@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,8 @@
 #include "render_core/scene/scene.h"
 
 namespace catgs {
+
+struct ViewSample;
 
 inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 
@@ -84,6 +87,9 @@ void note_origin(const glm::dvec3& origin, std::vector<std::string>& notes);
 /// A place about `origin`, as the files beside a scene have it.
 nlohmann::ordered_json json_place(const glm::vec3& place, const glm::dvec3& origin);
 
+/// Nothing where there is no such file. Throws InputError for a faulty one.
+std::optional<Sidecar> sidecar_at(const HintFiles& files);
+
 /// The model that the sidecar names, if any. Throws InputError for a faulty sidecar.
 std::optional<SplatModel> model_in_sidecar(const HintFiles& files);
 
@@ -92,13 +98,18 @@ std::optional<SplatModel> model_in_sidecar(const HintFiles& files);
 void use_model(const HintFiles& files, const std::optional<SplatModel>& wanted, SplatModel& model,
                std::vector<std::string>& notes);
 
+/// Keeps an estimate with what else is computed of a scene: tells that of before, or else calls
+/// `estimate` and keeps the answer.
+using KeepView = std::function<SceneHints(const std::function<SceneHints()>& estimate)>;
+
 /// Takes each hint from the first source that has it: the sidecar; the training cameras (first
 /// camera, levelled by find_up(), the box around them grown by half its diagonal); the orbit in the
 /// scene's file, which narrows what estimate_hints() finds; estimate_hints(). `up` (unit) is for a
-/// scene whose sidecar names none. A faulty sidecar throws InputError. Unusable camera files, which
-/// were not written for us, only add a note.
-SceneHints find_hints(const GaussianCloud& cloud, const HintFiles& files,
+/// scene whose sidecar names none. `sample` is called unless `keep`, which may be null, knows. A
+/// faulty sidecar throws InputError. Unusable camera files, which were not written for us, only add
+/// a note.
+SceneHints find_hints(const std::function<ViewSample()>& sample, const HintFiles& files,
                       const std::optional<glm::vec3>& up, std::vector<std::string>& notes,
-                      std::shared_ptr<ThreadPool> pool);
+                      std::shared_ptr<ThreadPool> pool, const KeepView& keep = {});
 
 }  // namespace catgs

@@ -7,6 +7,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/sanitize.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/load_context.h"
@@ -64,7 +65,12 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
     throw InputError(location.given.string(), "",
                      fmt::format("none of its {} Gaussians can be drawn", scene.report.read));
   if (options.first_view || tell_anything(hints))
-    scene.hints = find_hints(scene.cloud, hints, options.up, scene.notes, pool);
+    scene.hints = find_hints(
+        [&] {
+          auto sample = view_sample(location, scene.cloud.model, hints.origin, LoadContext(*pool));
+          return sample ? *std::move(sample) : view_sample(scene.cloud);
+        },
+        hints, options.up, scene.notes, pool, options.keep_view);
   scene.hints.origin = hints.origin;
   note_origin(hints.origin, scene.notes);
   context.report(1.0);
@@ -80,7 +86,6 @@ SceneInPages open_in_pages(const SceneLocation& location, const LoadOptions& opt
 
 SceneInPages open_in_pages(const std::filesystem::path& tree, const SceneLocation& made_of,
                            const LoadOptions& options) {
-  constexpr std::uint64_t outline_gaussians = 1'000'000;
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const LoadContext context(*pool, options.progress);
   SceneInPages scene;
@@ -100,8 +105,15 @@ SceneInPages open_in_pages(const std::filesystem::path& tree, const SceneLocatio
   scene.outline.report = {.read = header.read, .dropped = header.dropped};
   HintFiles hints = made_of.hints;
   hints.origin = header.origin;
-  scene.outline.hints =
-      find_hints(scene.outline.cloud, hints, options.up, scene.outline.notes, pool);
+  const GaussianCloud& all = scene.outline.cloud;
+  scene.outline.hints = find_hints(
+      [&] {
+        auto levels = made_of.has_levels()
+                          ? view_sample(made_of, all.model, hints.origin, LoadContext(*pool))
+                          : std::nullopt;
+        return levels ? *std::move(levels) : view_sample(all);
+      },
+      hints, options.up, scene.outline.notes, pool, options.keep_view);
   note_origin(hints.origin, scene.outline.notes);
   context.report(1.0);
   return scene;

@@ -18,12 +18,14 @@ struct LoadOptions {
   std::optional<std::size_t> gaussian_budget;  // of a scene with levels: the finest that fit
   std::optional<glm::vec3> up;                 // unit; where no sidecar says which way is up
   std::optional<SplatModel> model;             // in place of what sidecar and file say
+  KeepView keep_view;                          // null: the first view is estimated at each load
   bool first_view = true;  // false: it is not looked for where no file tells any of it
   std::function<void(double fraction)> progress;  // called from the loading thread, 0…1
   int threads = 0;                                // 0: one per processor
 };
 
-/// Reads a scene. Throws InputError. Memory peaks at the cloud and a few bytes per Gaussian.
+/// Reads a scene. Throws InputError. Memory peaks at the cloud, a few bytes per Gaussian
+/// and a ViewSample.
 Scene load_scene(const SceneLocation& location, const LoadOptions& options = {});
 /// The same for a path that locate_scene() resolves.
 Scene load_scene(const std::filesystem::path& path, const LoadOptions& options = {});

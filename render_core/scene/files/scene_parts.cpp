@@ -3,7 +3,9 @@
 #include <functional>
 #include <utility>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/scene/files/sanitize.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/keep_if.h"
@@ -30,9 +32,8 @@ std::optional<DecodedParts> levels_in_parts(const SceneLocation& location,
                      scene.notes,  sample.origin};
   parts.read = [read = scene.read, origin = sample.origin](
                    std::uint64_t part, const auto& reading) { return read(part, origin, reading); };
-  const std::size_t step =
-      (parts.sample.size() + DecodedParts::most_sampled - 1) / DecodedParts::most_sampled;
-  keep_if(parts.sample, [&](std::size_t i) { return i % step == 0; });
+  const EvenSample even(parts.sample.size(), DecodedParts::most_sampled);
+  keep_if(parts.sample, [&](std::size_t i) { return even.contains(i); });
   return parts;
 }
 
@@ -59,12 +60,6 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
   const SaneReach reach = sane_reach(sample);
   sanitize(sample, reach, context);
 
-  HintFiles hints = location.hints;
-  hints.origin = parts->origin;
-  if (wants_hints && !sample.empty())
-    scene.hints = find_hints(sample, hints, options.up, scene.notes, pool);
-  scene.hints.origin = scene.parts.origin = parts->origin;
-  note_origin(parts->origin, scene.notes);
   scene.parts.format = parts->format;
   scene.parts.each = [read = parts->read, count = parts->count, used = sample.model, reach,
                       pool](const auto& take) {
@@ -79,6 +74,18 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
     }
     return dropped;
   };
+  const auto sample_all = [&] {
+    auto levels = view_sample(location, sample.model, parts->origin, context);
+    if (levels) return *std::move(levels);
+    return view_sample(location.format->size(location.files).gaussians,
+                       [&](const auto& take) { scene.parts.each(take); });
+  };
+  HintFiles hints = location.hints;
+  hints.origin = parts->origin;
+  if (wants_hints && !sample.empty())
+    scene.hints = find_hints(sample_all, hints, options.up, scene.notes, pool, options.keep_view);
+  scene.hints.origin = scene.parts.origin = parts->origin;
+  note_origin(parts->origin, scene.notes);
   scene.sample = std::move(sample);
   return scene;
 }

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "render_core/base/error.h"
+#include "render_core/base/even_sample.h"
 
 namespace catgs {
 
@@ -49,7 +50,7 @@ std::vector<std::byte> read_rows(const ByteSource& file, std::uint64_t offset,
   // One read where the rows are neighbours.
   const std::size_t together = rows.step == 1 ? end - begin : 1;
   for (std::size_t i = begin; i < end; i += together)
-    file.read(offset + (rows.first + i * rows.step) * row_bytes,
+    file.read(offset + (rows.first + EvenSample::number(i, rows.step)) * row_bytes,
               std::span(bytes).subspan((i - begin) * row_bytes, together * row_bytes));
   return bytes;
 }

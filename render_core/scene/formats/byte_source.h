@@ -47,7 +47,7 @@ class ByteSource {
 /// Whether the first bytes of a file are these.
 bool begins_with(const ByteSource& file, std::string_view bytes);
 
-/// Some rows of a file of rows: `first`, `first + step` and so on, `count` of them.
+/// Some rows of a file of rows: `count` of them from `first` on; with a `step`, an EvenSample.
 struct FileRows {
   std::uint64_t first = 0, count = 0, step = 1;
 };

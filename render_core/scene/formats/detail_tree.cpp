@@ -119,9 +119,11 @@ void require_level(const std::string& file, int levels, std::optional<int> level
 }
 
 void fail_budget(const std::string& file, std::size_t budget, std::size_t coarsest) {
-  throw InputError(file, "Gaussian budget",
-                   fmt::format("{} is less than the {} of the coarsest level", budget, coarsest),
-                   "raise the budget");
+  throw BudgetTooSmall(
+      InputError(file, "Gaussian budget",
+                 fmt::format("{} is less than the {} of the coarsest level", budget, coarsest),
+                 "raise the budget"),
+      coarsest);
 }
 
 DetailChoice choose_detail(const DetailTree& tree, const std::string& file,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render_core/base/error.h"
 #include "render_core/scene/formats/load_context.h"
 #include "render_core/scene/gaussian_cloud.h"
 
@@ -41,7 +42,12 @@ struct DetailChoice {
 /// Throws InputError that names `file` if both are given, or if there is no such level.
 void require_level(const std::string& file, int levels, std::optional<int> level,
                    std::optional<std::size_t> budget);
-/// Throws InputError: the budget is less than the coarsest level has.
+/// The budget is less than the coarsest level has.
+struct BudgetTooSmall : InputError {
+  BudgetTooSmall(const InputError& error, std::size_t least) : InputError(error), coarsest(least) {}
+  std::size_t coarsest;  // Gaussians
+};
+/// Throws BudgetTooSmall.
 [[noreturn]] void fail_budget(const std::string& file, std::size_t budget, std::size_t coarsest);
 
 /// Level `level`, or the finest one whose Gaussians fit into `budget`. As many nodes as still fit

@@ -31,6 +31,9 @@ struct TreeScene {
 };
 TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context);
 
+/// Of an outline, at most.
+inline constexpr std::uint64_t outline_gaussians = 1'000'000;
+
 /// The same for the finest level with at most `most_gaussians` that ends a page, or that of the
 /// root's page: an outline of a scene of any size.
 TreeScene read_tree(TreeFile& tree, std::uint64_t most_gaussians, const LoadContext& context);

@@ -39,11 +39,8 @@ SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<Thre
   LoadOptions load;
   load.up = up_of(options.scene);
   load.model = model_of(options.scene);
-  // A start that is estimated from a sample may lie beyond the walls.
   if (!options.scene.lod && !options.scene.budget)
-    if (auto scene = scene_in_parts(location, load, pool);
-        scene && scene->hints.source != "estimated")
-      return by_parts(*std::move(scene));
+    if (auto scene = scene_in_parts(location, load, pool)) return by_parts(*std::move(scene));
   return by_parts(load_scene(location, options.scene, options.threads, quiet));
 }
 

@@ -125,6 +125,23 @@ TEST(FirstSight, AnyUpIsKept) {
     EXPECT_GT(glm::dot(up(estimate(cloud, axis).start_pose), axis), 0.5f);
 }
 
+// Two exporters write the same capture with half a turn about x between them.
+TEST(FirstSight, AHalfTurnedSceneIsSeenTheSame) {
+  const glm::quat half(0, 1, 0, 0);
+  for (const GaussianCloud& cloud : {hall(100000), flat(100000)}) {
+    GaussianCloud turned = cloud;
+    for (std::size_t i = 0; i < cloud.size(); ++i) {
+      turned.mean[i] = half * cloud.mean[i];
+      turned.rotation[i] = half * cloud.rotation[i];
+    }
+    const SceneHints one = estimate(cloud, find_up(cloud, {}));
+    const SceneHints other = estimate(turned, find_up(turned, {}));
+    EXPECT_LT(glm::distance(half * one.start_pose.position, other.start_pose.position), 1e-3f);
+    EXPECT_LT(glm::distance(half * forward(one.start_pose), forward(other.start_pose)), 1e-3f);
+    EXPECT_LT(glm::distance(half * up(one.start_pose), up(other.start_pose)), 1e-3f);
+  }
+}
+
 TEST(FirstSight, RepeatsItselfWithAnyNumberOfThreads) {
   const GaussianCloud cloud = flat(50000);
   const Pose one = estimate_hints(cloud, up_z, std::make_shared<ThreadPool>(1)).start_pose;

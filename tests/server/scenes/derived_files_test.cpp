@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "render_core/scene/files/save_scene.h"
+#include "server/scenes/kept_views.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
@@ -41,6 +42,46 @@ TEST_F(DerivedFilesTest, NamesFollowTheContentOfAScene) {
   EXPECT_NE(name_of("a hall.ply", coarse), name);
   age(folder_ / "a hall.ply", 1h);
   EXPECT_NE(name_of("a hall.ply"), name) << "another time";
+}
+
+TEST_F(DerivedFilesTest, FirstViewsAreKeptWhateverIsLoaded) {
+  save_scene(random_cloud(10, 0), folder_ / "a.ply");
+  const SceneLocation scene = locate_scene(folder_ / "a.ply");
+  const DerivedFiles files(trees_);
+  ServerConfig config;
+  int estimates = 0;
+  const auto kept = [&] {
+    return keep_view(&files, scene, config)([&] {
+      SceneHints hints;
+      hints.scale = 0.1f + static_cast<float>(++estimates);
+      hints.up = {0.6f, 0.0f, 0.8f};
+      hints.start_pose.position = {1e9f, -1.0f / 3.0f, 1e-9f};
+      hints.limits.max = {7, 8, 9};
+      return hints;
+    });
+  };
+  const SceneHints first = kept();
+  config.lod = 3;
+  config.scene_memory_mb = 1;
+  write("a.json", R"({"title": "It tells no up"})");
+  const SceneHints again = kept();
+  EXPECT_EQ(estimates, 1);
+  EXPECT_EQ(again.scale, first.scale);
+  EXPECT_EQ(again.up, first.up);
+  EXPECT_EQ(again.start_pose.position, first.start_pose.position);
+  EXPECT_EQ(again.limits.max, first.limits.max);
+  EXPECT_EQ(again.source, "estimated");
+  for (const auto& entry : fs::directory_iterator(trees_))
+    if (entry.path().extension() == ".view") fs::resize_file(entry.path(), 40);
+  kept();
+  EXPECT_EQ(estimates, 2) << "it was damaged";
+  config.up = "+z";
+  kept();
+  write("a.json", R"({"up": "+y"})");
+  kept();
+  age(folder_ / "a.ply", 1h);
+  kept();
+  EXPECT_EQ(estimates, 5) << "other facts";
 }
 
 TEST_F(DerivedFilesTest, NamesFollowAllFilesOfAFolderButItsSidecar) {

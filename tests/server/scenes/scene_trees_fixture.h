@@ -27,7 +27,8 @@ class SceneTreesTest : public LibraryTest {
   std::vector<fs::path> trees() const {
     std::vector<fs::path> trees;
     for (const auto& entry : fs::directory_iterator(folder_ / "trees"))
-      if (entry.path().filename() != "lock") trees.push_back(entry.path());
+      if (entry.path().filename() != "lock" && entry.path().extension() != ".view")
+        trees.push_back(entry.path());
     return trees;
   }
   static std::string bytes_in(const fs::path& file) {

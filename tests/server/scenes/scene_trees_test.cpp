@@ -271,6 +271,24 @@ TEST_F(SceneTreesTest, NothingIsWrittenUnlessConfigured) {
   EXPECT_THAT(names, UnorderedElementsAre("scenes", "a.ply"));
 }
 
+// Whatever of the scene is in memory then.
+TEST_F(SceneTreesTest, FirstViewIsKeptForTheNextStart) {
+  start();
+  visit("a");
+  library_.reset();
+  fs::path kept;
+  for (const auto& entry : fs::directory_iterator(folder_ / "trees"))
+    if (entry.path().extension() == ".view") kept = entry.path();
+  ASSERT_FALSE(kept.empty());
+  const std::string bytes = bytes_in(kept);
+  write("trees/" + kept.filename().string(),
+        bytes.substr(0, bytes.rfind('\n', bytes.size() - 2) + 1) + "77\n");
+  start();
+  EXPECT_EQ(visit("a")->facts.scale, 77.0f);
+  build("a");
+  EXPECT_EQ(entry("a")->facts.scale, 77.0f) << "drawn from its tree";
+}
+
 TEST_F(SceneTreesTest, PosterIsKeptForTheNextStart) {
   const auto poster_of_next_start = [&] {
     start();

@@ -197,11 +197,32 @@ export class CameraController {
     this.keep_up();
   }
 
+  /** Half a turn, for captures that stand on their head: an orbiting camera sees them from above again. */
+  turn_over(): void {
+    this.end_flight(false);
+    const over = (pose: Pose, focus: Vec3): Pose => {
+      const turned = this.rig_.turn_over(pose, this.mode_ === 'orbit' ? focus : pose.position);
+      return { ...turned, position: this.rig_.within(turned.position) };
+    };
+    if (this.scene_) {
+      const start_pose = over(this.scene_.start_pose, this.scene_.focus);
+      this.scene_ = { ...this.scene_, up: scale(this.rig_.up, -1), start_pose };
+    }
+    this.rig_.pose = over(this.rig_.pose, this.rig_.focus);
+    this.rig_.up = scale(this.rig_.up, -1);
+    this.rig_.refocus();
+  }
+
+  /** Another up (unit) that the scene keeps. */
+  set_up(up: Vec3): void {
+    this.rig_.up = up;
+    this.keep_up();
+  }
+
   /** Makes `up` (unit) the scene's up, and flies to where a visitor sees the surface at `point` from. */
   stand_on(point: Vec3, up: Vec3, at_once = false): void {
     const to = this.rig_.standing_before(point, up);
-    this.rig_.up = up;
-    this.keep_up();
+    this.set_up(up);
     this.fly_to(to, point, at_once);
   }
 

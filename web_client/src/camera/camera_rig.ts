@@ -132,6 +132,18 @@ export class CameraRig {
     this.pose = { position, orientation: multiply(by, orientation) };
   }
 
+  /** What was down is up. About a level axis through `centre`, so that the horizon stays level. */
+  turn_over(pose: Pose, centre: Vec3): Pose {
+    const above = rotate(pose.orientation, [0, -1, 0]);
+    const view = rotate(pose.orientation, forward);
+    const ahead = normalize(this.level_part(add(view, scale(above, 1e-3))), right);
+    const by = axis_angle(ahead, Math.PI);
+    return {
+      position: add(centre, rotate(by, sub(pose.position, centre))),
+      orientation: multiply(by, pose.orientation),
+    };
+  }
+
   /** Where a camera sees the surface at `point` from that a visitor stands on, with `up` as up. */
   standing_before(point: Vec3, up: Vec3): Eye {
     const level = (v: Vec3): Vec3 => sub(v, scale(up, dot(v, up)));

@@ -47,6 +47,7 @@ export class Navigation {
   readonly gestures = new GestureRouter();
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
+  private readonly chosen_ups_ = new Map<string, Vec3>();
   private readonly inertia_ = new Inertia();
   private readonly picks_: Picks;
   private scene_id_: string | undefined;
@@ -65,6 +66,7 @@ export class Navigation {
       this.camera.smoothing_s = 0;
       this.inertia_.enabled = false;
     }
+    this.up_changed.listen(() => this.chosen_ups_.set(this.scene_id, this.camera.up));
     const { axes, is_touched } = this.bind_input();
     this.loop = new CameraLoop(this.camera, axes, is_touched, this.inertia_, clock, (sample) => {
       worker.post({ kind: 'camera', sample });
@@ -130,6 +132,24 @@ export class Navigation {
     this.camera.turn_up(angle_rad);
     this.up_changed.emit();
     this.moved();
+  }
+
+  /** Half a turn of the scene: what was up is down. */
+  turn_over(): void {
+    this.camera.turn_over();
+    this.up_changed.emit();
+    this.moved();
+  }
+
+  /** The up that the visitor has chosen for this scene; undefined: the scene's own. */
+  get chosen_up(): Vec3 | undefined {
+    return this.chosen_ups_.get(this.scene_id);
+  }
+
+  /** Chooses an up (unit) without moving the camera. */
+  choose_up(up: Vec3): void {
+    this.camera.set_up(up);
+    this.up_changed.emit();
   }
 
   /** Makes the surface in the middle of the view the floor. Returns whether there is one. */
@@ -265,6 +285,11 @@ export class Navigation {
     this.scene_id_ = scene.sceneId;
     this.camera.walker = undefined;
     this.camera.load(scene_setup(scene));
+    const up = this.chosen_up;
+    if (up) {
+      this.camera.set_up(up);
+      this.camera.reset();
+    }
     const mode = start_mode(scene);
     if (mode) this.set_mode(mode);
     this.loop.enable();

@@ -71,7 +71,7 @@ export class Toolbar {
     const actions: Readonly<Record<string, () => void>> = {
       M: () => this.navigation_.next_mode(),
       R: () => this.navigation_.reset(),
-      U: () => this.navigation_.turn_up(Math.PI),
+      U: () => this.navigation_.turn_over(),
       F: toggle_full_screen,
       I: () => this.toggle('stats'),
       H: () => this.toggle('help'),

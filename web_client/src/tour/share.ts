@@ -1,5 +1,5 @@
 // Links that lead back to a view. The view is in the fragment, which no server sees. Pure.
-import { short_coordinate, unit } from '../base/vector';
+import { normalize, short_coordinate, unit, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { text } from '../text/text';
@@ -7,6 +7,8 @@ import { text } from '../text/text';
 export interface SharedView {
   readonly eye: Eye | undefined;
   readonly mode: CameraMode | undefined;
+  /** Unit; undefined: the scene's own. */
+  readonly up?: Vec3 | undefined;
   readonly tour_index: number | undefined;
   readonly stop_index: number | undefined;
 }
@@ -24,6 +26,7 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
     fragment.set('at', numbers.map((v) => String(short_coordinate(v, 6))).join(','));
   }
   if (view.mode) fragment.set('mode', view.mode);
+  if (view.up) fragment.set('up', view.up.map((v) => String(Number(v.toPrecision(6)))).join(','));
   if (view.tour_index) fragment.set('tour', String(view.tour_index + 1));
   if (view.stop_index !== undefined) fragment.set('stop', String(view.stop_index + 1));
   url.hash = fragment.toString().replaceAll('%2C', ',');
@@ -53,9 +56,18 @@ export function read_shared(page_url: string): SharedView {
   return {
     eye: read_eye(fragment.get('at') ?? ''),
     mode,
+    up: read_up(fragment.get('up') ?? ''),
     tour_index: ordinal('tour'),
     stop_index: ordinal('stop'),
   };
+}
+
+function read_up(written: string): Vec3 | undefined {
+  const parts = written.split(',');
+  const up = parts.map(Number);
+  const [x, y, z] = up as [number, number, number];
+  const good = parts.length === 3 && Math.abs(Math.hypot(x, y, z) - 1) < 0.01;
+  return good ? normalize([x, y, z], [0, -1, 0]) : undefined;
 }
 
 function read_eye(written: string): Eye | undefined {

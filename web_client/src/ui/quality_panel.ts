@@ -45,10 +45,10 @@ export class QualityPanel {
     for (const [id, turns] of [
       ['up-left', 0.25],
       ['up-right', -0.25],
-      ['up-flip', 0.5],
     ] as const) {
       on_click(id, () => navigation_.turn_up(turns * 2 * Math.PI));
     }
+    on_click('up-flip', () => navigation_.turn_over());
     on_click('up-surface', () => void this.stand_here());
     navigation_.changed.listen(() => this.show());
     this.show();

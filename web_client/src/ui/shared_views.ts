@@ -13,9 +13,9 @@ export class SharedViews {
 
   /** The view that the visitor has now. */
   get present(): SharedView {
-    const { eye, mode } = this.parts_.navigation.camera;
+    const { camera, chosen_up } = this.parts_.navigation;
     const { tour_index, stop_index } = this.player_.state;
-    return { eye, mode, tour_index, stop_index };
+    return { eye: camera.eye, mode: camera.mode, up: chosen_up, tour_index, stop_index };
   }
 
   /** A link to it. */
@@ -23,8 +23,9 @@ export class SharedViews {
     return share_address(location.href, this.parts_.navigation.scene_id, this.present);
   }
 
-  /** Mode and camera of a shared view. */
-  show({ eye, mode }: SharedView): void {
+  /** Up, mode and camera of a shared view. */
+  show({ eye, mode, up }: SharedView): void {
+    if (up) this.parts_.navigation.choose_up(up);
     if (mode) this.parts_.navigation.set_mode(mode);
     if (!eye) return;
     this.player_.pause();

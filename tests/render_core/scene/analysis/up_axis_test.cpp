@@ -1,6 +1,8 @@
 #include "render_core/scene/analysis/up_axis.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -10,6 +12,7 @@
 
 #include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
+#include "render_core/synth/synth.h"
 #include "tests/support/interiors.h"
 #include "tests/support/surface_clouds.h"
 
@@ -59,9 +62,67 @@ TEST(UpAxis, LookAtAcceptsDegenerateDirections) {
   }
 }
 
+const glm::quat as_it_is(1, 0, 0, 0), half_about_x(0, 1, 0, 0), half_about_z(0, 0, 0, 1);
+
+struct Known {
+  const char* name;
+  GaussianCloud cloud;
+  glm::vec3 up;
+};
+
 TEST(UpAxis, FloorsTellUp) {
   EXPECT_LT(degrees_between(find_up(hall(50000), {}), minus_y), 0.5f);
   EXPECT_LT(degrees_between(find_up(flat(50000), {}), plus_z), 0.5f);
+}
+
+// Rooms have floor and ceiling alike, so the rest of the content tells.
+TEST(UpAxis, AHalfTurnOfTheSceneTurnsUpOver) {
+  const std::vector<Known> scenes = {
+      {"hall", hall(50000), minus_y},
+      {"flat", flat(50000), plus_z},
+      {"city", synthesize(SynthKind::city, 100'000, 1).cloud, minus_y},
+      {"garden", synthesize(SynthKind::garden, 100'000, 1).cloud, minus_y}};
+  for (const auto& [name, cloud, up] : scenes)
+    for (const glm::quat& half : {half_about_x, half_about_z}) {
+      GaussianCloud turned = cloud;
+      turn(turned, half);
+      if (up == plus_z && half == half_about_z) continue;  // it stands as before
+      EXPECT_LT(degrees_between(find_up(turned, {}), half * up), 0.5f) << name;
+    }
+}
+
+/// Every `stride`-th Gaussian, in the order along an axis; 3: in that of the cloud.
+GaussianCloud part_of(const GaussianCloud& cloud, int axis, std::size_t stride) {
+  std::vector<std::size_t> order(cloud.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (axis < 3)
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return cloud.mean[i][axis]; });
+  GaussianCloud part;
+  part.resize(cloud.size() / stride, 0);
+  for (std::size_t k = 0; k < part.size(); ++k) {
+    const std::size_t i = order[k * stride];
+    part.mean[k] = cloud.mean[i];
+    part.rotation[k] = cloud.rotation[i];
+    part.scale[k] = cloud.scale[i];
+    part.opacity[k] = cloud.opacity[i];
+    part.sh[k] = cloud.sh_of(i)[0];
+  }
+  return part;
+}
+
+TEST(UpAxis, NeitherOrderNorSampleChangesIt) {
+  const glm::quat y_up = glm::angleAxis(glm::radians(90.0f), glm::vec3(1, 0, 0));
+  const std::vector<Known> scenes = {{"hall", hall(80000), minus_y}, {"flat", flat(80000), plus_z}};
+  for (const auto& [name, cloud, up] : scenes)
+    for (const glm::quat& by : {as_it_is, half_about_x, y_up, glm::conjugate(y_up),
+                                glm::angleAxis(glm::radians(35.0f), up)})
+      for (int axis = 0; axis <= 3; ++axis)
+        for (const std::size_t stride : {1, 2, 7, 16}) {
+          GaussianCloud part = part_of(cloud, axis, stride);
+          turn(part, by);
+          const glm::vec3 found = find_up(part, {}, static_cast<float>(stride));
+          EXPECT_LT(degrees_between(found, by * up), 1.0f) << name << " " << axis << " " << stride;
+        }
 }
 
 TEST(UpAxis, AHallThatWasCapturedAskewIsLevelled) {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/camera_list.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/sog.h"
@@ -101,8 +102,9 @@ class Hints : public FolderTest {
  protected:
   SceneHints find() {
     return find_hints(
-        cloud_, {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json", orbit_},
-        up_, notes_, pool_);
+        [&] { return view_sample(cloud_); },
+        {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json", orbit_}, up_,
+        notes_, pool_);
   }
   std::optional<OrbitLimits> orbit_;
   std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);

@@ -8,9 +8,12 @@
 
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/formats/splat.h"
+#include "render_core/scene/keep_if.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_encoder.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/interiors.h"
+#include "tests/support/surface_clouds.h"
 
 namespace catgs::test {
 namespace {
@@ -55,6 +58,78 @@ class ScenePartsTest : public FolderTest {
 
   const std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
 };
+
+/// Every `stride`-th Gaussian, as large as those that it stands for.
+GaussianCloud coarser(const GaussianCloud& cloud, std::size_t stride) {
+  GaussianCloud part = cloud;
+  keep_if(part, [&](std::size_t i) { return i % stride == 0; });
+  for (glm::vec3& scale : part.scale) scale *= std::sqrt(static_cast<float>(stride));
+  return part;
+}
+
+LoadOptions chosen(std::optional<int> lod, std::optional<std::size_t> budget = std::nullopt) {
+  LoadOptions options;
+  options.lod = lod;
+  options.gaussian_budget = budget;
+  return options;
+}
+
+void expect_same_view(const SceneHints& one, const SceneHints& other, float tolerance) {
+  EXPECT_LE(glm::distance(one.up, other.up), tolerance);
+  EXPECT_LE(glm::distance(one.start_pose.position, other.start_pose.position), tolerance);
+  EXPECT_LE(angle_between(one.start_pose.orientation, other.start_pose.orientation), tolerance);
+  EXPECT_LE(glm::distance(one.focus, other.focus), tolerance);
+  EXPECT_LE(glm::distance(one.limits.min, other.limits.min), tolerance);
+  EXPECT_LE(glm::distance(one.limits.max, other.limits.max), tolerance);
+  EXPECT_LE(std::abs(one.scale - other.scale), tolerance);
+}
+
+// Its halves have levels of their own, so that a budget chooses finer ones for one half first.
+TEST_F(ScenePartsTest, TheFirstViewIsTheSameWhateverIsLoaded) {
+  const GaussianCloud whole = flat(60000);
+  std::vector<std::vector<GaussianCloud>> levels;
+  for (const std::size_t stride : {1, 3, 9}) {
+    levels.push_back({coarser(whole, stride), coarser(whole, stride)});
+    keep_if(levels.back()[0],
+            [&, all = levels.back()[0]](std::size_t i) { return all.mean[i].x < 5; });
+    keep_if(levels.back()[1],
+            [&, all = levels.back()[1]](std::size_t i) { return all.mean[i].x >= 5; });
+  }
+  const SceneLocation location = locate_scene(write_streamed_sog(levels));
+  const SceneHints finest = load_scene(location).hints;
+  EXPECT_GT(finest.up.z, 0.999f);
+  for (const int lod : {0, 1, 2})
+    expect_same_view(load_scene(location, chosen(lod)).hints, finest, 0);
+  for (const std::size_t budget : {7'000, 15'000, 30'000, 45'000}) {
+    const Scene scene = load_scene(location, chosen(std::nullopt, budget));
+    ASSERT_LE(scene.cloud.size(), budget);
+    expect_same_view(scene.hints, finest, 0);
+  }
+  const auto parted = scene_in_parts(location, {}, pool_);
+  expect_same_view(parted->hints, finest, 0);
+  const auto tree = folder_ / "a.tree";
+  build_tree(parted->parts, tree, 1'000'000, *pool_, LoadContext(*pool_));
+  expect_same_view(open_in_pages(tree, location, {}).outline.hints, finest, 0);
+  const SceneHints paged = open_in_pages(locate_scene(tree)).outline.hints;
+  expect_same_view(load_scene(tree).hints, paged, 0);
+  EXPECT_GT(paged.up.z, 0.999f);
+}
+
+TEST_F(ScenePartsTest, AFileInPartsHasTheFirstViewOfTheLoadedScene) {
+  const auto path = write("a.ply", ply_bytes(hall(70000)));
+  const auto parted = scene_in_parts(locate_scene(path), {}, pool_, 9999);
+  expect_same_view(parted->hints, load_scene(path).hints, 0);
+}
+
+TEST_F(ScenePartsTest, AKeptViewIsNotEstimatedAgain) {
+  const auto path = write("a.ply", ply_bytes(ball(1.0f)));
+  SceneHints kept;
+  kept.scale = 77.0f;
+  LoadOptions options;
+  options.keep_view = [&](const auto&) { return kept; };
+  EXPECT_EQ(load_scene(path, options).hints.scale, 77.0f);
+  EXPECT_EQ(scene_in_parts(locate_scene(path), options, pool_)->hints.scale, 77.0f);
+}
 
 TEST_F(ScenePartsTest, ATreeKeepsTheModel) {
   GaussianCloud cloud = random_cloud(2000, 0);

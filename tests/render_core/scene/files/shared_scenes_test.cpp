@@ -1,6 +1,7 @@
 // Real files from the shared folder; skipped where it is absent.
 #include <tuple>
 
+#include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
@@ -40,6 +41,17 @@ TEST_F(SharedScenes, SingleFiles) {
     EXPECT_EQ(scene.report.read, gaussians);
     EXPECT_EQ(scene.cloud.sh_degree, sh_degree);
     expect_sound(scene);
+  }
+}
+
+TEST_F(SharedScenes, AHalfTurnTurnsUpOver) {
+  for (const char* file : {"skull.sog", "guitar.compressed.ply", "playbot"}) {
+    GaussianCloud cloud = load_scene(scenes_ / file).cloud;
+    EXPECT_LT(find_up(cloud, {}).y, -0.98f) << file;
+    const glm::quat half(0, 1, 0, 0);
+    for (glm::vec3& mean : cloud.mean) mean = half * mean;
+    for (glm::quat& rotation : cloud.rotation) rotation = half * rotation;
+    EXPECT_GT(find_up(cloud, {}).y, 0.98f) << file;
   }
 }
 
