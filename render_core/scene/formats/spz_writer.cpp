@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "render_core/scene/formats/axes.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/spz_format.h"
+#include "render_core/scene/formats/stored_places.h"
 
 namespace catgs {
 
@@ -64,9 +66,9 @@ class GzipWriter {
   std::vector<char> buffer_ = std::vector<char>(256 * 1024);
 };
 
-int fractional_bits_for(const GaussianCloud& cloud) {
+int fractional_bits_for(std::span<const glm::vec3> means) {
   float largest = 0.0f;
-  for (const glm::vec3& m : cloud.mean)
+  for (const glm::vec3& m : means)
     largest = std::max({largest, std::abs(m.x), std::abs(m.y), std::abs(m.z)});
   int bits = max_fractional_bits;
   const auto fits = [&] {
@@ -113,7 +115,9 @@ char quantised_sh(float value, int bits) {
 
 void write_spz(const GaussianCloud& cloud, std::ostream& to) {
   const AxisFlip flip(right_up_back);
-  const int fractional_bits = fractional_bits_for(cloud);
+  const auto fixed = [](float coordinate) { return coordinate; };
+  const StoredPlaces places(cloud, fixed, 1 << (position_bits + 1));
+  const int fractional_bits = fractional_bits_for(places.mean());
   GzipWriter gzip(to);
 
   std::string header(gzip_header_bytes, '\0');
@@ -138,7 +142,7 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
     out.push_back(static_cast<char>(to_byte(value)));
   };
   write_attribute([&](std::string& out, std::size_t i) {
-    const glm::vec3 mean = flip.mean(cloud.mean[i]);
+    const glm::vec3 mean = flip.mean(places.mean()[i]);
     for (int k = 0; k < 3; ++k) append_fixed24(out, mean[k], fractional_bits);
   });
   write_attribute(
@@ -148,7 +152,7 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
       append_byte(out, 255.0f * (colour_scale * cloud.sh_of(i)[0][k] + 0.5f));
   });
   write_attribute([&](std::string& out, std::size_t i) {
-    for (int k = 0; k < 3; ++k) append_byte(out, 16.0f * (std::log(cloud.scale[i][k]) + 10.0f));
+    for (int k = 0; k < 3; ++k) append_byte(out, 16.0f * (std::log(places.scale()[i][k]) + 10.0f));
   });
   write_attribute([&](std::string& out, std::size_t i) {
     append_smallest_three(out, flip.rotation(cloud.rotation[i]));

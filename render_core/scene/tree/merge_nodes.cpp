@@ -52,6 +52,14 @@ struct Members {
   std::vector<double> weights;
 };
 
+double quantile(std::vector<double>& values, double share) {
+  const auto at =
+      static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size())));
+  const auto nth = values.begin() + std::max<std::ptrdiff_t>(at - 1, 0);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
 /// Joins the cheapest pair of groups again and again.
 ///
 /// Each group keeps the cheapest partner that it found when it last searched. Groups only vanish or
@@ -105,15 +113,21 @@ class Grouping {
 
 Grouping::Grouping(const Members& members)
     : count_(members.size()), blocks_((count_ + block_size - 1) / block_size), groups_(count_) {
-  double size = 0.0;
-  glm::dvec3 middle(0.0);
-  for (int i = 0; i < count_; ++i) {
+  std::vector<double> values(static_cast<std::size_t>(count_));
+  const auto quantile_of = [&](double share, const auto& value) {
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = value(i);
+    return quantile(values, share);
+  };
+  for (int i = 0; i < count_; ++i)
     variance_[i] = members.covariances[static_cast<std::size_t>(i)].trace() / 3.0;
-    size += std::sqrt(variance_[i]);
-    middle += glm::dvec3(members.cloud.mean[static_cast<std::size_t>(i)]);
-  }
+  // Without extremes, so that a few huge or far Gaussians do not decide how others are grouped.
+  const double largest = quantile_of(0.98, [&](std::size_t i) { return std::sqrt(variance_[i]); });
+  double size = 0.0;
+  for (const double value : values) size += std::min(value, largest);
   size = std::max(size / count_, 1e-30);
-  middle /= count_;
+  glm::dvec3 middle;
+  for (int k = 0; k < 3; ++k)
+    middle[k] = quantile_of(0.5, [&](std::size_t i) { return double{members.cloud.mean[i][k]}; });
   for (int f = 0; f < feature_count; ++f) {
     std::ranges::fill(features_[f], too_far);
     if (f >= box_count) continue;
@@ -246,14 +260,6 @@ struct Merged {
   std::vector<Factor> factors;
   double displacement = 0.0;  // the 0.9 quantile
 };
-
-double quantile(std::vector<double>& values, double share) {
-  const auto at =
-      static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size())));
-  const auto nth = values.begin() + std::max<std::ptrdiff_t>(at - 1, 0);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
 
 /// One Gaussian for each group, in the order of the groups' first members.
 Merged match_moments(const Members& members, const Grouping& grouping) {

@@ -22,7 +22,8 @@ struct NodeView {
 ///
 ///   |mean_a - mean_b|^2 + (size_a - size_b)^2 + (colour_reach |colour_a - colour_b|)^2
 ///
-/// with size = sqrt(tr Sigma / 3) and colour_reach = 12 x the children's mean size. A group becomes
+/// with size = sqrt(tr Sigma / 3) and colour_reach = 12 x the children's mean size (sizes over
+/// their 0.98 quantile count as that). A group becomes
 /// one Gaussian by moment matching with the weights w = o A: opacity x RMS projected area. With
 /// W = sum w,
 ///

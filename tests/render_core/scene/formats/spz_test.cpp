@@ -77,13 +77,29 @@ TEST(Spz, AFlagTellsAntialiasedScenes) {
 
 TEST(Spz, LargeScenesKeepTheirExtentWithFewerFractionalBits) {
   GaussianCloud cloud = random_cloud(1000, 0);
-  cloud.mean[7] = glm::vec3(100000.0f, -1.0f, 5.0f);
+  // Too many to be far from all others.
+  for (std::size_t i = 0; i < 20; ++i) cloud.mean[i] = glm::vec3(100000.0f, -1.0f, 5.0f);
   std::ostringstream out;
   write_spz(cloud, out);
   const GaussianCloud read = parse(out.str()).cloud;
   EXPECT_NEAR(read.mean[7].x, 100000.0f, 1.0f / 128);
-  cloud.mean[7].x = 1e7f;
+  for (std::size_t i = 0; i < 20; ++i) cloud.mean[i].x = 1e7f;
   input_error([&] { write_spz(cloud, out); });
+}
+
+TEST(Spz, AFarGaussianCostsTheOthersNothing) {
+  GaussianCloud cloud = storable_cloud(300, 0);
+  cloud.mean[7] = {0.0f, -2e6f, 0.0f};
+  std::ostringstream out;
+  write_spz(cloud, out);
+  const SpzFile read = parse(out.str());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i == 7) continue;
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(read.cloud.mean[i][k], cloud.mean[i][k], std::ldexp(1.0f, -17));
+  }
+  EXPECT_LT(read.cloud.mean[7].y, -1.0f);
+  EXPECT_LT(read.cloud.scale[7].x, 1e-4f);
 }
 
 TEST(Spz, TheAxesExtensionIsObeyed) {

@@ -152,6 +152,19 @@ TEST(MergeNodes, MomentsAndProjectedAreaAreKept) {
   EXPECT_EQ(node.facts.error, 0.0f);      // of 0.9 of its Gaussians
 }
 
+// Such a Gaussian does not decide how the others are grouped.
+TEST(MergeNodes, AHugeOrFarGaussianCostsTheOthersNothing) {
+  const GaussianCloud cloud = wall(512);
+  const auto error_of = [](const GaussianCloud& of) {
+    return merged(leaf(of, 0, 256), leaf(of, 256, 256), 1).facts.error;
+  };
+  GaussianCloud huge = cloud, far = cloud;
+  huge.scale[100] = glm::vec3(1e4f);
+  far.mean[100] = glm::vec3(1e6f);
+  EXPECT_LT(error_of(huge), 1.1f * error_of(cloud));
+  EXPECT_LT(error_of(far), 1.1f * error_of(cloud));
+}
+
 TEST(MergeNodes, BoundsAndErrorsHoldThoseOfTheChildren) {
   const GaussianCloud cloud = test::random_cloud(1000, 3, 6);
   const Node leaves[] = {leaf(cloud, 0, 256), leaf(cloud, 256, 256), leaf(cloud, 512, 256),
