@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -23,6 +24,11 @@ namespace {
 using Factor = math::CovarianceFactor<double>;
 
 constexpr int most_members = 2 * static_cast<int>(cluster_size);
+/// Of a covariance. Moments of a closed surface make Gaussians that are too small to close it, and
+/// the sum of areas that hide each other is too large. On playbot, in a pool for a third of it, a
+/// picture has 33.5 dB without growth, and 34.5, 34.2 dB with at most 1.5, 1.8; on a city of
+/// 400,000 in a pool for a quarter 17.9, 22.5, 22.3 dB.
+constexpr double most_grown = 1.5;
 constexpr float too_far = 1e18f;  // for any partner, in mean sizes
 
 /// The Gaussians of the children.
@@ -261,6 +267,16 @@ struct Merged {
   double displacement = 0.0;  // the 0.9 quantile
 };
 
+/// The opacity of a merged Gaussian with the covariance `c`, whose parts have the sum `weight` of
+/// opacity x area. Where full opacity would not hide as much, `c` grows, by most_grown at most.
+double cover(double weight, Covariance<double>& c) {
+  const double opacity = weight / std::max(c.area(), 1e-30);  // a needle has no area
+  const double grown = std::clamp(opacity, 1.0, most_grown);
+  const Covariance<double> matched = std::exchange(c, {});
+  c.add(grown, matched);
+  return std::clamp(opacity / grown, alpha_min, double{max_opacity});
+}
+
 /// One Gaussian for each group, in the order of the groups' first members.
 Merged match_moments(const Members& members, const Grouping& grouping) {
   const auto count = static_cast<std::size_t>(members.size());
@@ -298,15 +314,13 @@ Merged match_moments(const Members& members, const Grouping& grouping) {
   }
   std::vector<double> displacements;
   for (std::size_t slot = 0; slot < sums.size(); ++slot) {
-    const Sums& s = sums[slot];
+    Sums& s = sums[slot];
     const auto last = static_cast<std::size_t>(s.last);
     const bool alone = s.members == 1;
+    const auto opacity = static_cast<float>(cover(s.weight, s.covariance));
     merged.cloud.mean[slot] = alone ? from.mean[last] : glm::vec3(s.mean);
     merged.factors.push_back(alone ? members.factors[last] : factor_of(s.covariance));
-    const double area = std::max(s.covariance.area(), 1e-30);
-    merged.cloud.opacity[slot] = alone ? from.opacity[last]
-                                       : std::clamp(static_cast<float>(s.weight / area),
-                                                    static_cast<float>(alpha_min), max_opacity);
+    merged.cloud.opacity[slot] = alone ? from.opacity[last] : opacity;
     displacements.push_back(alone ? 0.0 : std::sqrt(s.squared_displacement));
   }
   merged.displacement = quantile(displacements, 0.9);

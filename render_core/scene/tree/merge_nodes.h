@@ -29,7 +29,8 @@ struct NodeView {
 ///
 ///   mean = sum w mean_i / W,    SH = sum w SH_i / W,
 ///   Sigma = sum w (Sigma_i + d_i d_i^T) / W,    d_i = mean_i - mean,
-///   opacity = W / A(Sigma), at most max_opacity: the projected area is kept.
+///   opacity = W / A(Sigma): the projected area is kept. Where that is more than 1, Sigma grows by
+///   as much, but no more than 1.5 times.
 ///
 /// A(Sigma) = sqrt(tr(adj Sigma) / 3) is the root of the mean of det over the projections of Sigma
 /// onto planes of all directions n, since that determinant is n^T adj(Sigma) n. A group of one
