@@ -10,7 +10,7 @@ struct ShCoefficients {
   float base[3];  // RGB
   static constexpr int words = (packed_sh_bytes(max_sh_degree) + 3) / 4;
   std::uint32_t higher[words];  // four harmonics each, coefficient-major RGB
-  float unit[max_sh_degree];    // PackedUnits::sh
+  float unit[max_sh_degree];    // PackedUnits::sh in the Gaussian's octave
 };
 
 /// Loads the planes of a record from byte `at` on.
@@ -57,7 +57,8 @@ __device__ inline ShCoefficients load_sh(const SceneArrays& scene, std::uint32_t
       break;
   }
   const float4 units = __ldg(reinterpret_cast<const float4*>(&scene.units[i / cluster_size]));
-  sh.unit[0] = units.y, sh.unit[1] = units.z, sh.unit[2] = units.w;
+  const float octave = packed_sh_octave(a.w);
+  sh.unit[0] = octave * units.y, sh.unit[1] = octave * units.z, sh.unit[2] = octave * units.w;
   return sh;
 }
 

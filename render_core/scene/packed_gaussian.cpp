@@ -62,22 +62,61 @@ std::uint8_t pack_sh(float value, float unit) {
   return static_cast<std::uint8_t>(128.0f + std::clamp(std::round(steps), -sh_levels, sh_levels));
 }
 
+/// The largest harmonic of each degree.
+std::array<float, max_sh_degree> largest_sh(const GaussianCloud& cloud, std::uint32_t i) {
+  std::array<float, max_sh_degree> largest{};
+  const glm::vec3* sh = cloud.sh_of(i);
+  for (int k = 1; k < cloud.sh_count(); ++k)
+    for (int channel = 0; channel < 3; ++channel) {
+      float& of_degree = largest[static_cast<std::size_t>(sh_degree_of(k) - 1)];
+      of_degree = std::max(of_degree, std::abs(sh[k][channel]));
+    }
+  return largest;
+}
+
+/// The median of those that are not zero; zero if all are.
+float typical(std::span<float> values) {
+  const auto some = std::ranges::partition(values, [](float v) { return v == 0.0f; });
+  if (some.empty()) return 0.0f;
+  const auto middle = some.begin() + static_cast<std::ptrdiff_t>(some.size() / 2);
+  std::ranges::nth_element(some, middle);
+  return *middle;
+}
+
 PackedUnits units_for(const GaussianCloud& cloud, std::span<const std::uint32_t> members,
                       std::span<const Factor> factors) {
   int exponent = std::numeric_limits<int>::min();
   for (const Factor& factor : factors) exponent = std::max(exponent, unit_exponent(factor));
-  float largest_sh[max_sh_degree + 1] = {};
-  for (const std::uint32_t i : members) {
-    const glm::vec3* sh = cloud.sh_of(i);
-    for (int k = 1; k < cloud.sh_count(); ++k)
-      for (int channel = 0; channel < 3; ++channel)
-        largest_sh[sh_degree_of(k)] =
-            std::max(largest_sh[sh_degree_of(k)], std::abs(sh[k][channel]));
-  }
   PackedUnits units{power_of_two(exponent), {}};
-  for (int degree = 1; degree <= max_sh_degree; ++degree)
-    units.sh[degree - 1] = largest_sh[degree] / sh_levels * sh_unit_scale;
+  std::array<std::array<float, cluster_size>, max_sh_degree> largest;
+  for (std::size_t j = 0; j < members.size(); ++j) {
+    const auto of_one = largest_sh(cloud, members[j]);
+    for (std::size_t d = 0; d < max_sh_degree; ++d) largest[d][j] = of_one[d];
+  }
+  for (std::size_t d = 0; d < max_sh_degree; ++d)
+    units.sh[d] = typical(std::span(largest[d]).first(members.size())) / sh_levels * sh_unit_scale;
   return units;
+}
+
+/// The least octave that holds a Gaussian's harmonics, as the bits of its record.
+std::uint32_t sh_octave(const GaussianCloud& cloud, std::uint32_t i, const PackedUnits& units) {
+  const auto largest = largest_sh(cloud, i);
+  float times = 0.0f;
+  for (std::size_t d = 0; d < max_sh_degree; ++d)
+    if (largest[d] > 0.0f)
+      times = std::max(times, largest[d] * sh_unit_scale / (sh_levels * units.sh[d]));
+  const float octave = std::ceil(std::log2(std::max(times, 0x1p-20f)));
+  return static_cast<std::uint32_t>(
+      std::clamp(static_cast<int>(octave) - least_sh_octave, 0, static_cast<int>(sh_octave_mask)));
+}
+
+/// The level nearest to `level` with these octave bits.
+std::uint16_t with_octave(std::uint16_t level, std::uint32_t octave) {
+  constexpr int bits = 4, most = 0xffff >> bits;
+  static_assert(sh_octave_mask == (1u << bits) - 1);
+  const int low = static_cast<int>(octave);
+  const int upper = std::clamp((level - low + (1 << (bits - 1))) >> bits, 0, most);
+  return static_cast<std::uint16_t>(upper << bits | low);
 }
 
 std::uint16_t pack_log2_opacity(float log2_opacity) {
@@ -86,12 +125,13 @@ std::uint16_t pack_log2_opacity(float log2_opacity) {
 }
 
 PackedGeometry pack_geometry(const GaussianCloud& cloud, std::uint32_t i, const Factor& factor,
-                             float unit) {
+                             const PackedUnits& units) {
   const glm::vec3 &mean = cloud.mean[i], &base = *cloud.sh_of(i);
   PackedGeometry g{{mean.x, mean.y, mean.z},  pack_log2_opacity(std::log2(cloud.opacity[i])),
                    glm::packHalf1x16(base.r), {},
                    glm::packHalf1x16(base.g), glm::packHalf1x16(base.b)};
-  pack_factor(factor, std::ilogb(unit), g.factor);
+  if (cloud.sh_degree > 0) g.log2_opacity = with_octave(g.log2_opacity, sh_octave(cloud, i, units));
+  pack_factor(factor, std::ilogb(units.factor), g.factor);
   return g;
 }
 
@@ -125,13 +165,14 @@ PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint
   std::array<std::byte, packed_record_bytes(max_sh_degree)> record;
   ClusterBounds bounds;
   for (std::size_t j = 0; j < members.size(); ++j) {
-    const PackedGeometry geometry = pack_geometry(cloud, members[j], factors[j], units.factor);
+    const PackedGeometry geometry = pack_geometry(cloud, members[j], factors[j], units);
     std::memcpy(record.data(), &geometry, sizeof(geometry));
     const glm::vec3* sh = cloud.sh_of(members[j]);
+    const float octave = packed_sh_octave(geometry.log2_opacity);
     for (int b = 0; b < packed_sh_bytes(degree); ++b) {
       const int k = 1 + b / 3;
       record[sizeof(geometry) + b] =
-          std::byte{pack_sh(sh[k][b % 3], units.sh[sh_degree_of(k) - 1])};
+          std::byte{pack_sh(sh[k][b % 3], octave * units.sh[sh_degree_of(k) - 1])};
     }
     for (int at = 0; at < record_bytes;) {
       const int width = packed_plane_width(degree, at);
@@ -167,11 +208,22 @@ void unpack_cluster(std::span<const std::byte> block, const PackedUnits& units, 
                                           static_cast<float>(alpha_min), max_opacity);
     glm::vec3* sh = cloud.sh.data() + (first + j) * cloud.sh_count();
     sh[0] = {from_half(g.base_red), from_half(g.base_green), from_half(g.base_blue)};
+    const float octave = packed_sh_octave(g.log2_opacity);
     for (int b = 0; b < packed_sh_bytes(degree); ++b) {
       const int k = 1 + b / 3;
       sh[k][b % 3] = packed_sh(std::to_integer<std::uint32_t>(record[sizeof(g) + b]), 0) *
-                     units.sh[sh_degree_of(k) - 1];
+                     (octave * units.sh[sh_degree_of(k) - 1]);
     }
+  }
+}
+
+void clear_sh_octaves(std::span<std::byte> block, std::size_t count) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    std::byte* const at = &block[packed_offset(0, 16, i) + offsetof(PackedGeometry, log2_opacity)];
+    std::uint16_t level = 0;
+    std::memcpy(&level, at, sizeof level);
+    level = with_octave(level, -least_sh_octave);
+    std::memcpy(at, &level, sizeof level);
   }
 }
 

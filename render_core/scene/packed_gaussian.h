@@ -29,7 +29,7 @@ namespace catgs {
 /// The first part of a record. Halves are IEEE binary16, as bits.
 struct PackedGeometry {
   float mean[3];               // world; not rounded: view depth decides the blending order
-  std::uint16_t log2_opacity;  // see unpack_log2_opacity()
+  std::uint16_t log2_opacity;  // see unpack_log2_opacity() and packed_sh_octave()
   std::uint16_t base_red;      // halves: the first harmonic
   std::uint32_t factor[3];     // see unpack_factor()
   std::uint16_t base_green, base_blue;
@@ -39,7 +39,9 @@ static_assert(sizeof(PackedGeometry) == 32);
 /// The units of the numbers in a cluster's records.
 struct alignas(16) PackedUnits {
   float factor;  // of the cluster's largest Gaussian, a power of two
-  float sh[3];   // of the harmonics of degree 1, 2 and 3; the largest in the cluster is 127 / 2^15
+  // Of the harmonics of degree 1, 2 and 3: the largest one of the median Gaussian is 127 / 2^15. So
+  // no Gaussian's extremes decide how finely the others are stored.
+  float sh[3];
 };
 
 constexpr int packed_sh_bytes(int sh_degree) { return 3 * (sh_coefficient_count(sh_degree) - 1); }
@@ -87,6 +89,17 @@ CATGS_HD inline float unpack_log2_opacity(std::uint32_t level) {
   return static_cast<float>(level) * (log2_opacity_min / 65535.0f);
 }
 
+/// The four low bits of an opacity's level are also those of its harmonics' octave: the power of
+/// two that a Gaussian's units are larger than the cluster's by. It is the least one that holds the
+/// harmonics of all degrees, so an extreme one is coarse or clamped for its own Gaussian alone. The
+/// other twelve bits bring the level as near to the opacity as they can: within 0.07 %, at the
+/// opaque end 0.13 %. Without higher harmonics all bits are the opacity's.
+constexpr std::uint32_t sh_octave_mask = 15;
+constexpr int least_sh_octave = -6;
+CATGS_HD inline float packed_sh_octave(std::uint32_t log2_opacity) {
+  return power_of_two(least_sh_octave + static_cast<int>(log2_opacity & sh_octave_mask));
+}
+
 /// A covariance factor has one exponent for all entries: the number of octaves below the cluster's
 /// unit. One exponent is enough, because the ends of a needle move by the entries' error relative
 /// to the largest one. That is 2^-15, where halves would leave 2^-12. The words hold yx xx, zx yy
@@ -105,7 +118,7 @@ CATGS_HD inline math::CovarianceFactor<float> unpack_factor(const std::uint32_t 
   return {on(0), beside(0), on(1), beside(1), beside(2), on(2)};
 }
 
-/// A harmonic in units of its degree, from byte j of four: (byte - 128) / 2^15.
+/// A harmonic in its Gaussian's units of its degree, from byte j of four: (byte - 128) / 2^15.
 CATGS_HD inline float packed_sh(std::uint32_t word, int j) {
 #if defined(__CUDA_ARCH__)
   // The byte in bits 8 to 15 of 1 + byte / 2^15: exact, and cheaper than a conversion.
@@ -137,6 +150,10 @@ PackedCluster pack_cluster(const GaussianCloud& cloud, std::span<const std::uint
 void unpack_cluster(std::span<const std::byte> block, const PackedUnits& units, std::size_t count,
                     GaussianCloud& cloud, std::size_t first,
                     std::span<math::CovarianceFactor<double>> factors);
+
+/// Gives `count` records of a block the octave 0, that of trees of version 1, whose units hold the
+/// largest harmonics of the cluster. Their opacities are rounded as those of new records.
+void clear_sh_octaves(std::span<std::byte> block, std::size_t count);
 
 /// Rotation and scale with R diag(scale^2) R^T = L L^T, by one-sided Jacobi rotations of L's
 /// columns (Demmel, Veselic 1992).

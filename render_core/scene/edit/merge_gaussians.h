@@ -10,7 +10,8 @@ namespace catgs {
 
 /// Joins pairs of Gaussians until `wanted` (at least 1) are left. Fewer ones stay as they are.
 ///
-/// A pair becomes one Gaussian by the moment matching of tree/merge_nodes.h. So the sums over the
+/// A pair becomes one Gaussian by the moment matching of tree/merge_nodes.h. It does not grow: over
+/// many rounds that would blur. So the sums over the
 /// scene of w, w mean and w SH are kept, where w = o A is opacity x RMS projected area, unless an
 /// opacity has to be clamped. A Gaussian that is never joined stays bit for bit.
 ///

@@ -31,6 +31,16 @@ void Losses::positions(const std::function<float(const glm::vec3& mean)>& step_a
         largest, share(smaller)));
 }
 
+void Losses::moved(std::span<const glm::vec3> stored) {
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < stored.size(); ++i) moved += stored[i] != cloud_.mean[i] ? 1 : 0;
+  if (moved > 0)
+    add(
+        fmt::format("{} are far from all others, and are moved nearer and made as much smaller; "
+                    ".ply and .glb keep them",
+                    share(moved)));
+}
+
 void Losses::scales(float least, float most) {
   std::size_t enlarged = 0, shrunk = 0;
   float times_larger = 1.0f, times_smaller = 1.0f;

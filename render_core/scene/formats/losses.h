@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,8 @@ class Losses {
 
   /// Tells how many Gaussians are smaller than the largest step between positions around them.
   void positions(const std::function<float(const glm::vec3& mean)>& step_at);
+  /// Tells how many have another mean in the file, because they are far from all others.
+  void moved(std::span<const glm::vec3> stored);
   /// Tells how many become larger or smaller: those whose middle scale is outside least…most.
   void scales(float least, float most);
   /// Tells how many have a coefficient of a degree in first…last outside ±most. `what`: the values.

@@ -4,12 +4,14 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <span>
 #include <utility>
 
 #include "render_core/base/portable.h"
+#include "render_core/scene/formats/calm_range.h"
 
 namespace catgs {
 
@@ -31,7 +33,10 @@ struct Node {
 // Centres::score() fits into 32 bits.
 constexpr float steps = 3800.0f;
 constexpr std::size_t max_dims = 48;
-constexpr double range_rms = 16.0;  // values beyond it are rare, and compared as if they were at it
+constexpr double range_rms = 16.0;          // vectors with values beyond it are wild
+constexpr std::size_t extreme_share = 160;  // one of so many values, or vectors, may be extreme
+constexpr float widest_gap = 0.25f;         // of the others' range, before an extreme value
+constexpr std::size_t wild_entries = 16;    // wild vectors have at most one of so many entries
 
 /// A vector in whole numbers, padded with zeros.
 template <std::size_t width>
@@ -44,24 +49,35 @@ std::int32_t dot(const Row<width>& a, const Row<width>& b) {
   return sum;
 }
 
-/// The root mean square of the vectors' values; an even sample of the vectors is enough.
-double rms_of(const VectorTable& vectors) {
-  const std::size_t taken = std::min(vectors.count, std::size_t{1} << 14);
-  double sum = 0.0;
+using Indices = std::vector<std::uint32_t>;
+
+/// The root mean square of the values of these vectors. Where a few extreme vectors decide it, that
+/// of the others. An even sample is enough.
+double rms_of(const VectorTable& vectors, const Indices& members) {
+  const std::size_t taken = std::min(members.size(), std::size_t{1} << 14);
+  std::vector<double> squares(taken);
   for (std::size_t i = 0; i < taken; ++i) {
-    const float* vector = vectors[i * vectors.count / taken];
-    for (std::size_t d = 0; d < vectors.dims; ++d) sum += double{vector[d]} * vector[d];
+    const float* vector = vectors[members[i * members.size() / taken]];
+    for (std::size_t d = 0; d < vectors.dims; ++d) squares[i] += double{vector[d]} * vector[d];
   }
-  return std::sqrt(sum / static_cast<double>(taken * vectors.dims));
+  std::ranges::sort(squares);
+  const auto mean = [&](std::size_t count) {
+    return std::accumulate(squares.begin(), squares.begin() + static_cast<std::ptrdiff_t>(count),
+                           0.0) /
+           static_cast<double>(count * vectors.dims);
+  };
+  const double all = mean(taken), calm = mean(taken - taken / extreme_share);
+  return std::sqrt(calm > 0.0 && all > 4.0 * calm ? calm : all);
 }
 
 template <std::size_t width>
-std::vector<Row<width>> rows_of(const VectorTable& vectors, ThreadPool& pool) {
-  std::vector<Row<width>> rows(vectors.count);
-  const auto scale = static_cast<float>(steps / std::max(range_rms * rms_of(vectors), 1e-20));
-  pool.parallel_for((vectors.count + block - 1) / block, [&](std::size_t b) {
-    for (std::size_t i = b * block; i < std::min(vectors.count, (b + 1) * block); ++i) {
-      const float* vector = vectors[i];
+std::vector<Row<width>> rows_of(const VectorTable& vectors, const Indices& members, double rms,
+                                ThreadPool& pool) {
+  std::vector<Row<width>> rows(members.size());
+  const auto scale = static_cast<float>(steps / std::max(range_rms * rms, 1e-20));
+  pool.parallel_for((rows.size() + block - 1) / block, [&](std::size_t b) {
+    for (std::size_t i = b * block; i < std::min(rows.size(), (b + 1) * block); ++i) {
+      const float* vector = vectors[members[i]];
       for (std::size_t d = 0; d < vectors.dims; ++d) {
         const float at = std::clamp(vector[d] * scale, -steps, steps);
         rows[i][d] = static_cast<std::int16_t>(static_cast<int>(at + (steps + 0.5f)) -
@@ -107,13 +123,12 @@ class Centres {
 template <std::size_t width>
 class Tree {
  public:
-  Tree(const VectorTable& vectors, ThreadPool& pool)
+  /// `members`: the vectors that the tree is of. `rms`: of their values.
+  Tree(const VectorTable& vectors, Indices members, double rms, ThreadPool& pool)
       : pool_(pool),
-        rows_(rows_of<width>(vectors, pool)),
-        order_(vectors.count),
-        labels_(vectors.count) {
-    std::iota(order_.begin(), order_.end(), 0u);
-  }
+        rows_(rows_of<width>(vectors, members, rms, pool)),
+        order_(std::move(members)),
+        labels_(order_.size()) {}
 
   /// The nodes without children, in order.
   std::vector<Node> grow(std::size_t size) {
@@ -304,28 +319,54 @@ class Tree {
 
   ThreadPool& pool_;
   std::vector<Row<width>> rows_;  // in the order
-  std::vector<std::uint32_t> order_;
+  Indices order_;
   std::vector<std::uint8_t> labels_;  // by place in the order
 };
 
+/// Adds at most `size` entries for these vectors.
 template <std::size_t width>
-Palette palette_of(const VectorTable& vectors, std::size_t size, ThreadPool& pool) {
-  Tree<width> tree(vectors, pool);
+void add_entries(const VectorTable& vectors, Indices of, double rms, std::size_t size,
+                 Palette& palette, ThreadPool& pool) {
+  Tree<width> tree(vectors, std::move(of), rms, pool);
   const std::vector<Node> leaves = tree.grow(size);
-  Palette palette;
-  palette.entries.resize(leaves.size() * vectors.dims);
-  palette.labels.resize(vectors.count);
+  const std::size_t first = palette.entries.size() / vectors.dims;
+  palette.entries.resize((first + leaves.size()) * vectors.dims);
   pool.parallel_for(leaves.size(), [&](std::size_t leaf) {
     std::vector<double> sums(vectors.dims);
     const std::span<const std::uint32_t> members = tree.members(leaves[leaf]);
     for (const std::uint32_t i : members) {
-      palette.labels[i] = static_cast<std::uint32_t>(leaf);
+      palette.labels[i] = static_cast<std::uint32_t>(first + leaf);
       for (std::size_t d = 0; d < vectors.dims; ++d) sums[d] += vectors[i][d];
     }
     for (std::size_t d = 0; d < vectors.dims; ++d)
-      palette.entries[leaf * vectors.dims + d] =
+      palette.entries[(first + leaf) * vectors.dims + d] =
           static_cast<float>(sums[d] / static_cast<double>(members.size()));
   });
+}
+
+template <std::size_t width>
+Palette palette_of(const VectorTable& vectors, std::size_t size, ThreadPool& pool) {
+  Indices calm(vectors.count), wild;
+  std::iota(calm.begin(), calm.end(), 0u);
+  const double rms = rms_of(vectors, calm);
+  const auto is_wild = [&](std::uint32_t i) {
+    const std::span values(vectors[i], vectors.dims);
+    return std::ranges::any_of(values,
+                               [&](float v) { return double{std::abs(v)} > range_rms * rms; });
+  };
+  if (size >= std::min(vectors.count, wild_entries)) {
+    std::ranges::copy_if(calm, std::back_inserter(wild), is_wild);
+    std::erase_if(calm, is_wild);
+  }
+  const std::size_t left = size - std::min(size, calm.size());
+  const std::size_t spare = std::min(wild.size(), std::max(size / wild_entries, left));
+  Palette palette;
+  palette.labels.resize(vectors.count);
+  add_entries<width>(vectors, std::move(calm), rms, size - spare, palette, pool);
+  if (!wild.empty()) {
+    const double rms_of_wild = rms_of(vectors, wild);
+    add_entries<width>(vectors, std::move(wild), rms_of_wild, spare, palette, pool);
+  }
   return palette;
 }
 
@@ -334,20 +375,27 @@ Palette palette_of(const VectorTable& vectors, std::size_t size, ThreadPool& poo
 Codebook::Codebook(std::vector<float> values) {
   assert(!values.empty());
   std::sort(values.begin(), values.end());
-  // Some values at even steps keep rare ones from being forgotten.
+  // Some values at even steps keep rare ones from being forgotten. Extremes far from all others
+  // take none of these.
+  const CalmRange calm = calm_range(values.size(), values.size() / extreme_share, widest_gap,
+                                    [&](std::size_t i) { return values[i]; });
+  const bool some = values[calm.first] < values[calm.last];
+  const float low = some ? values[calm.first] : values.front();
+  const float high = some ? values[calm.last] : values.back();
   std::vector<float> weighted = values;
   const std::size_t even = values.size() / 8 + 2 * values_.size();
-  const float step = (values.back() - values.front()) / static_cast<float>(even);
-  for (std::size_t i = 0; i <= even; ++i)
-    weighted.push_back(values.front() + step * static_cast<float>(i));
+  const float step = (high - low) / static_cast<float>(even);
+  for (std::size_t i = 0; i <= even; ++i) weighted.push_back(low + step * static_cast<float>(i));
   std::inplace_merge(weighted.begin(),
                      weighted.begin() + static_cast<std::ptrdiff_t>(values.size()), weighted.end());
 
   for (std::size_t k = 0; k < values_.size(); ++k) {  // between even shares and even steps
     const float share = weighted[(2 * k + 1) * weighted.size() / (2 * values_.size())];
     const float at = (static_cast<float>(k) + 0.5f) / static_cast<float>(values_.size());
-    values_[k] = 0.5f * (share + values.front() + at * (values.back() - values.front()));
+    values_[k] = 0.5f * (share + low + at * (high - low));
   }
+  values_.front() = values.front();
+  values_.back() = values.back();
   move_to_means(weighted, codebook_rounds);
   move_to_means(values, 1);
   for (std::size_t k = 0; k < middles_.size(); ++k)

@@ -13,7 +13,8 @@ namespace catgs {
 class Codebook {
  public:
   /// Finds values with a small squared error by Lloyd's algorithm. Rare values keep errors of the
-  /// size of common ones. `values` are finite and not none.
+  /// size of common ones, but for extremes: those under 1 % cost the others nearly nothing.
+  /// `values` are finite and not none.
   explicit Codebook(std::vector<float> values);
   /// Index of the nearest value.
   [[nodiscard]] std::uint8_t nearest(float value) const;
@@ -42,9 +43,9 @@ struct Palette {
 };
 
 /// Finds at most `size` entries with a small squared error by a tree of k-means: each node divides
-/// its vectors among 16 children, and its entries by their squared errors. The time is usually
-/// linear in the number of vectors. The result depends neither on the number of threads nor on the
-/// machine.
+/// its vectors among 16 children, and its entries by their squared errors. Vectors that are far
+/// from all others share no entry with them. The time is usually linear in the number of vectors.
+/// The result depends neither on the number of threads nor on the machine.
 Palette make_palette(const VectorTable& vectors, std::size_t size, ThreadPool& pool);
 
 }  // namespace catgs

@@ -22,6 +22,7 @@
 #include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/palette.h"
 #include "render_core/scene/formats/sog.h"
+#include "render_core/scene/formats/stored_places.h"
 #include "render_core/scene/formats/zip_writer.h"
 
 namespace catgs {
@@ -31,6 +32,7 @@ namespace {
 constexpr std::size_t max_palette = 65536, palette_row = 64;
 constexpr std::size_t codebook_sample = std::size_t{1} << 16;  // triples
 constexpr std::size_t max_texels_across = 16383;               // of a WebP image
+constexpr float mean_steps = 65535.0f;                         // in the range of an axis
 // WebP knows efforts of 0 to 9. Bytes that look like noise become 6 % larger in a third of the
 // time. The labels would become half as large again.
 constexpr int effort = 1, effort_for_noise = 0;
@@ -98,10 +100,17 @@ Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
 
 double log_mean(double v) { return std::copysign(std::log1p(std::abs(v)), v); }
 
+StoredPlaces stored_places(const GaussianCloud& cloud) {
+  return {cloud, [](float v) { return static_cast<float>(log_mean(v)); }, mean_steps};
+}
+
 class Writer {
  public:
   Writer(const GaussianCloud& cloud, ThreadPool& pool)
-      : cloud_(cloud), pool_(pool), order_(morton_order(cloud.mean, pool)) {
+      : cloud_(cloud),
+        places_(stored_places(cloud)),
+        pool_(pool),
+        order_(morton_order(cloud.mean, pool)) {
     const double side = std::sqrt(static_cast<double>(cloud.size()));
     width_ = 4 * static_cast<std::size_t>(std::ceil(side / 4.0));
     height_ = (cloud.size() + width_ - 1) / width_;
@@ -159,15 +168,15 @@ class Writer {
     std::vector<glm::dvec3> logarithms(cloud_.size());
     glm::dvec3 low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      const glm::dvec3 m(cloud_.mean[i]);
+      const glm::dvec3 m(places_.mean()[i]);
       logarithms[i] = {log_mean(m.x), log_mean(m.y), log_mean(m.z)};
       low = glm::min(low, logarithms[i]);
       high = glm::max(high, logarithms[i]);
     }
-    const glm::dvec3 steps = 65535.0 / glm::max(high - low, 1e-20);
+    const glm::dvec3 steps = double{mean_steps} / glm::max(high - low, 1e-20);
     const auto store_byte = [&](const char* name, int effort_of_webp, int shift) {
       store(name, effort_of_webp, [&](std::size_t i) {
-        const glm::dvec3 at = glm::clamp((logarithms[i] - low) * steps, 0.0, 65535.0);
+        const glm::dvec3 at = glm::clamp((logarithms[i] - low) * steps, 0.0, double{mean_steps});
         const auto byte = [&](double v) {
           return static_cast<std::uint8_t>(static_cast<int>(v + 0.5) >> shift & 255);
         };
@@ -199,7 +208,7 @@ class Writer {
   }
 
   void scales() {
-    const auto log_scale = [&](std::size_t i, int k) { return std::log(cloud_.scale[i][k]); };
+    const auto log_scale = [&](std::size_t i, int k) { return std::log(places_.scale()[i][k]); };
     const Codebook book = codebook_of(cloud_.size(), [&](std::size_t i) {
       return glm::vec3(log_scale(i, 0), log_scale(i, 1), log_scale(i, 2));
     });
@@ -250,6 +259,7 @@ class Writer {
   }
 
   const GaussianCloud& cloud_;
+  const StoredPlaces places_;
   ThreadPool& pool_;
   std::vector<std::uint32_t> order_;  // of the texels
   std::size_t width_ = 0, height_ = 0;
@@ -261,13 +271,15 @@ class Writer {
 
 std::vector<std::string> sog_losses(const GaussianCloud& cloud) {
   glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  for (const glm::vec3& m : cloud.mean) {
-    const glm::vec3 logarithm(log_mean(m.x), log_mean(m.y), log_mean(m.z));
+  const StoredPlaces places = stored_places(cloud);
+  for (const glm::vec3& m : places.mean()) {
+    const glm::vec3 logarithm(glm::dvec3(log_mean(m.x), log_mean(m.y), log_mean(m.z)));
     low = glm::min(low, logarithm);
     high = glm::max(high, logarithm);
   }
   Losses losses(cloud);
-  losses.positions([steps = (high - low) / 65535.0f](const glm::vec3& mean) {
+  losses.moved(places.mean());
+  losses.positions([steps = (high - low) / mean_steps](const glm::vec3& mean) {
     const glm::vec3 at = steps * (1.0f + glm::abs(mean));
     return std::max({at.x, at.y, at.z});
   });

@@ -7,8 +7,11 @@
 #include <span>
 #include <vector>
 
+#include <glm/common.hpp>
+
 #include "render_core/base/host_device.h"
 #include "render_core/math/camera.h"
+#include "render_core/math/constants.h"
 #include "render_core/scene/tree/tree_shape.h"
 
 namespace catgs {
@@ -19,23 +22,35 @@ struct CutEye {
       : position(camera.world_from_camera.position),
         forward(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
         focal_px(std::max(camera.focal_px.x, camera.focal_px.y)),
-        near_z(camera.near_z) {}
+        near_z(camera.near_z) {
+    // Of the corner that is farthest from the axis, as far out as projections are exact.
+    const glm::vec2 centre = camera.principal_point_px, size(camera.size_px);
+    const glm::vec2 slope = static_cast<float>(fov_clamp) *
+                            glm::max(glm::abs(centre), glm::abs(size - centre)) /
+                            glm::vec2(camera.focal_px);
+    least_cosine = 1.0f / std::sqrt(1.0f + slope.x * slope.x + slope.y * slope.y);
+  }
 
-  /// An upper bound of a node's error in pixels: error x focal / the depth of the nearest point of
-  /// its box. Infinite where that point is nearer than the near plane. It grows towards the root.
+  /// An upper bound of a node's error in pixels: error x focal / the least depth of a point of its
+  /// box in view. That is no less than the near plane's, than the depth of the box, and than its
+  /// distance times the cosine of the widest angle in view. The bound grows towards the root.
   [[nodiscard]] CATGS_HD float error_px(float error, const Cluster& bounds) const {
-    const float centre = forward.x * (bounds.centre.x - position.x) +
-                         forward.y * (bounds.centre.y - position.y) +
-                         forward.z * (bounds.centre.z - position.z);
-    const float nearest = centre - (fabsf(forward.x) * bounds.half_extent.x +
-                                    fabsf(forward.y) * bounds.half_extent.y +
-                                    fabsf(forward.z) * bounds.half_extent.z);
-    // The magnitude of infinity is fixed, so that device code needs no library for it.
-    return nearest > near_z ? error * focal_px / nearest : 3e38f;
+    const float x = bounds.centre.x - position.x, y = bounds.centre.y - position.y,
+                z = bounds.centre.z - position.z;
+    const float depth =
+        forward.x * x + forward.y * y + forward.z * z -
+        (fabsf(forward.x) * bounds.half_extent.x + fabsf(forward.y) * bounds.half_extent.y +
+         fabsf(forward.z) * bounds.half_extent.z);
+    const float out_x = fmaxf(fabsf(x) - bounds.half_extent.x, 0.0f),
+                out_y = fmaxf(fabsf(y) - bounds.half_extent.y, 0.0f),
+                out_z = fmaxf(fabsf(z) - bounds.half_extent.z, 0.0f);
+    const float distance = sqrtf(out_x * out_x + out_y * out_y + out_z * out_z);
+    return error * focal_px / fmaxf(fmaxf(depth, least_cosine * distance), near_z);
   }
 
   glm::vec3 position, forward;  // world; the view axis, unit
   float focal_px, near_z;
+  float least_cosine;  // between the axis and what is in view
 };
 
 /// Below this share of the wanted detail, an error is not worth a node's children. From there to

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -23,6 +24,11 @@ namespace {
 using Factor = math::CovarianceFactor<double>;
 
 constexpr int most_members = 2 * static_cast<int>(cluster_size);
+/// Of a covariance. Moments of a closed surface make Gaussians that are too small to close it, and
+/// the sum of areas that hide each other is too large. On playbot, in a pool for a third of it, a
+/// picture has 33.5 dB without growth, and 34.5, 34.2 dB with at most 1.5, 1.8; on a city of
+/// 400,000 in a pool for a quarter 17.9, 22.5, 22.3 dB.
+constexpr double most_grown = 1.5;
 constexpr float too_far = 1e18f;  // for any partner, in mean sizes
 
 /// The Gaussians of the children.
@@ -51,6 +57,14 @@ struct Members {
   std::vector<Covariance<double>> covariances;
   std::vector<double> weights;
 };
+
+double quantile(std::vector<double>& values, double share) {
+  const auto at =
+      static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size())));
+  const auto nth = values.begin() + std::max<std::ptrdiff_t>(at - 1, 0);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
 
 /// Joins the cheapest pair of groups again and again.
 ///
@@ -105,15 +119,21 @@ class Grouping {
 
 Grouping::Grouping(const Members& members)
     : count_(members.size()), blocks_((count_ + block_size - 1) / block_size), groups_(count_) {
-  double size = 0.0;
-  glm::dvec3 middle(0.0);
-  for (int i = 0; i < count_; ++i) {
+  std::vector<double> values(static_cast<std::size_t>(count_));
+  const auto quantile_of = [&](double share, const auto& value) {
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = value(i);
+    return quantile(values, share);
+  };
+  for (int i = 0; i < count_; ++i)
     variance_[i] = members.covariances[static_cast<std::size_t>(i)].trace() / 3.0;
-    size += std::sqrt(variance_[i]);
-    middle += glm::dvec3(members.cloud.mean[static_cast<std::size_t>(i)]);
-  }
+  // Without extremes, so that a few huge or far Gaussians do not decide how others are grouped.
+  const double largest = quantile_of(0.98, [&](std::size_t i) { return std::sqrt(variance_[i]); });
+  double size = 0.0;
+  for (const double value : values) size += std::min(value, largest);
   size = std::max(size / count_, 1e-30);
-  middle /= count_;
+  glm::dvec3 middle;
+  for (int k = 0; k < 3; ++k)
+    middle[k] = quantile_of(0.5, [&](std::size_t i) { return double{members.cloud.mean[i][k]}; });
   for (int f = 0; f < feature_count; ++f) {
     std::ranges::fill(features_[f], too_far);
     if (f >= box_count) continue;
@@ -247,12 +267,14 @@ struct Merged {
   double displacement = 0.0;  // the 0.9 quantile
 };
 
-double quantile(std::vector<double>& values, double share) {
-  const auto at =
-      static_cast<std::ptrdiff_t>(std::ceil(share * static_cast<double>(values.size())));
-  const auto nth = values.begin() + std::max<std::ptrdiff_t>(at - 1, 0);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+/// The opacity of a merged Gaussian with the covariance `c`, whose parts have the sum `weight` of
+/// opacity x area. Where full opacity would not hide as much, `c` grows, by most_grown at most.
+double cover(double weight, Covariance<double>& c) {
+  const double opacity = weight / std::max(c.area(), 1e-30);  // a needle has no area
+  const double grown = std::clamp(opacity, 1.0, most_grown);
+  const Covariance<double> matched = std::exchange(c, {});
+  c.add(grown, matched);
+  return std::clamp(opacity / grown, alpha_min, double{max_opacity});
 }
 
 /// One Gaussian for each group, in the order of the groups' first members.
@@ -292,15 +314,13 @@ Merged match_moments(const Members& members, const Grouping& grouping) {
   }
   std::vector<double> displacements;
   for (std::size_t slot = 0; slot < sums.size(); ++slot) {
-    const Sums& s = sums[slot];
+    Sums& s = sums[slot];
     const auto last = static_cast<std::size_t>(s.last);
     const bool alone = s.members == 1;
+    const auto opacity = static_cast<float>(cover(s.weight, s.covariance));
     merged.cloud.mean[slot] = alone ? from.mean[last] : glm::vec3(s.mean);
     merged.factors.push_back(alone ? members.factors[last] : factor_of(s.covariance));
-    const double area = std::max(s.covariance.area(), 1e-30);
-    merged.cloud.opacity[slot] = alone ? from.opacity[last]
-                                       : std::clamp(static_cast<float>(s.weight / area),
-                                                    static_cast<float>(alpha_min), max_opacity);
+    merged.cloud.opacity[slot] = alone ? from.opacity[last] : opacity;
     displacements.push_back(alone ? 0.0 : std::sqrt(s.squared_displacement));
   }
   merged.displacement = quantile(displacements, 0.9);

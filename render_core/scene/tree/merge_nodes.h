@@ -22,13 +22,15 @@ struct NodeView {
 ///
 ///   |mean_a - mean_b|^2 + (size_a - size_b)^2 + (colour_reach |colour_a - colour_b|)^2
 ///
-/// with size = sqrt(tr Sigma / 3) and colour_reach = 12 x the children's mean size. A group becomes
+/// with size = sqrt(tr Sigma / 3) and colour_reach = 12 x the children's mean size (sizes over
+/// their 0.98 quantile count as that). A group becomes
 /// one Gaussian by moment matching with the weights w = o A: opacity x RMS projected area. With
 /// W = sum w,
 ///
 ///   mean = sum w mean_i / W,    SH = sum w SH_i / W,
 ///   Sigma = sum w (Sigma_i + d_i d_i^T) / W,    d_i = mean_i - mean,
-///   opacity = W / A(Sigma), at most max_opacity: the projected area is kept.
+///   opacity = W / A(Sigma): the projected area is kept. Where that is more than 1, Sigma grows by
+///   as much, but no more than 1.5 times.
 ///
 /// A(Sigma) = sqrt(tr(adj Sigma) / 3) is the root of the mean of det over the projections of Sigma
 /// onto planes of all directions n, since that determinant is n^T adj(Sigma) n. A group of one

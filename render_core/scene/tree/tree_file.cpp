@@ -59,9 +59,10 @@ TreeHeader read_tree_header(const ByteSource& file) {
   };
   constexpr std::string_view damaged = "the file is damaged: convert the scene again";
   if (header.magic != TreeHeader::right_magic) refuse("magic", "is not that of a tree", "");
-  if (header.version != TreeHeader::right_version)
+  if (header.version < TreeHeader::first_version || header.version > TreeHeader::right_version)
     refuse("version",
-           fmt::format("{} where {} is known", header.version, TreeHeader::right_version),
+           fmt::format("{} where {} to {} are known", header.version, TreeHeader::first_version,
+                       TreeHeader::right_version),
            "convert the scene again with this program");
   if (header.checksum != header.right_checksum())
     refuse("header", "its checksum is wrong", damaged);
@@ -102,6 +103,7 @@ std::unique_ptr<const TreePage> TreeFile::read(std::uint64_t number, const NodeF
   auto page = std::make_unique<TreePage>(shape_);
   file_->read(shape_.page_offset(number), page->bytes());
   page->check(number, file_->name(), above);
+  if (header_.version == TreeHeader::first_version) page->clear_sh_octaves();
   return page;
 }
 

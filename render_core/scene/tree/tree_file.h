@@ -25,7 +25,8 @@ struct TreeLevel {
 /// The first bytes of a .tree file, little-endian; pages follow at byte 4096 (TreeShape).
 struct TreeHeader {
   static constexpr std::array<char, 8> right_magic = {'c', 'a', 't', 'g', 's', 't', 'r', 'e'};
-  static constexpr std::uint32_t right_version = 1;
+  // Records of version 1 have no octaves for their harmonics: see clear_sh_octaves().
+  static constexpr std::uint32_t first_version = 1, right_version = 2;
   static constexpr std::size_t most_levels = 27;
 
   std::array<char, 8> magic = right_magic;
@@ -74,7 +75,8 @@ class TreeFile {
   [[nodiscard]] std::uint64_t pages_in_file() const;
 
   /// A page of [0, shape().pages()). `above`: of the node that the page refines, whose error and
-  /// bounds the page must not exceed. Throws InputError if it is damaged or missing.
+  /// bounds the page must not exceed. Records are of the right version, whatever the file has.
+  /// Throws InputError if it is damaged or missing.
   [[nodiscard]] std::unique_ptr<const TreePage> read(std::uint64_t number,
                                                      const NodeFacts* above = nullptr) const;
   /// The same, but null if it is damaged or missing. damage() counts it.

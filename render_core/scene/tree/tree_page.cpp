@@ -143,6 +143,12 @@ void TreePage::check(std::uint64_t number, std::string_view file, const NodeFact
   if (!unused.empty()) refuse(unused + " are not zeros");
 }
 
+void TreePage::clear_sh_octaves() {
+  if (shape_->sh_degree() == 0) return;
+  for (std::size_t slot = 0; slot < shape_->slots(); ++slot)
+    catgs::clear_sh_octaves(block(slot), facts(slot).count);
+}
+
 std::string TreePage::unused_fault(std::uint32_t used) const {
   const auto all = bytes();
   if (!zeros(all.first(TreeShape::page_head_bytes).subspan(sizeof(std::uint32_t))))

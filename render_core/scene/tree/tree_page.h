@@ -47,6 +47,8 @@ class TreePage {
   /// bounds, and unused bytes are zeros. `above`: of the node that the page refines, if it is
   /// known.
   void check(std::uint64_t number, std::string_view file, const NodeFacts* above = nullptr) const;
+  /// Turns checked records of version 1 into those of the right one.
+  void clear_sh_octaves();
 
  private:
   /// Names the first unused bytes that are not zeros; empty if there are none. `used`: a bit for

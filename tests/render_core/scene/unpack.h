@@ -34,7 +34,8 @@ inline Unpacked unpack(std::span<const std::byte> block, const PackedUnits& unit
     std::uint32_t word = 0;
     std::memcpy(&word, &record[sizeof(PackedGeometry) + static_cast<std::size_t>(b / 4 * 4)],
                 sizeof(word));
-    out.sh.push_back(packed_sh(word, b % 4) * units.sh[sh_degree_of(1 + b / 3) - 1]);
+    out.sh.push_back(packed_sh(word, b % 4) * (packed_sh_octave(out.geometry.log2_opacity) *
+                                               units.sh[sh_degree_of(1 + b / 3) - 1]));
   }
   return out;
 }

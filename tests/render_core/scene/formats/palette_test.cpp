@@ -42,6 +42,23 @@ TEST(CodebookTest, FewValuesAreKept) {
   EXPECT_EQ(Codebook({7.0f}).values()[Codebook({7.0f}).nearest(7.0f)], 7.0f);
 }
 
+double error_of(const Codebook& book, const std::vector<float>& numbers) {
+  double squares = 0.0;
+  for (const float v : numbers) squares += std::pow(book.values()[book.nearest(v)] - v, 2);
+  return squares;
+}
+
+TEST(CodebookTest, ExtremeValuesCostTheOthersNothing) {
+  for (const std::size_t count : {256u, 20'000u}) {
+    const std::vector<float> numbers = normal_numbers(count);
+    std::vector<float> with = numbers;
+    with.insert(with.end(), {-1000.0f, 300.0f});
+    const Codebook without_extremes(numbers), book(with);
+    EXPECT_LT(error_of(book, numbers), 1.1 * error_of(without_extremes, numbers) + 1e-4);
+    for (const float v : {-1000.0f, 300.0f}) EXPECT_EQ(book.values()[book.nearest(v)], v);
+  }
+}
+
 double error_of(const VectorTable& vectors, const Palette& palette) {
   double squares = 0.0;
   for (std::size_t i = 0; i < vectors.count; ++i)
@@ -80,6 +97,18 @@ TEST(PaletteTest, PalettesAreTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(a.labels, b.labels);
   EXPECT_EQ(std::set<std::uint32_t>(a.labels.begin(), a.labels.end()).size(), a.entries.size() / 9);
   EXPECT_GT(a.entries.size() / 9, 2900u) << "entries are used";
+}
+
+TEST(PaletteTest, ExtremeVectorsCostTheOthersNothing) {
+  constexpr std::size_t dims = 9, count = 30'000;
+  std::vector<float> numbers = normal_numbers(count * dims);
+  const VectorTable calm{numbers.data(), count, dims, dims};
+  ThreadPool pool(2);
+  const double before = error_of(calm, make_palette(calm, 1024, pool));
+  for (std::size_t d = 0; d < dims; ++d) numbers[d] = d % 2 ? 3e5f : -1e5f;
+  const Palette palette = make_palette(calm, 1024, pool);
+  EXPECT_LE(palette.entries.size(), 1024 * dims);
+  EXPECT_LT(error_of(calm, palette), 1.1 * before);
 }
 
 TEST(PaletteTest, EachVectorHasAnEntryWhileThereAreEnough) {

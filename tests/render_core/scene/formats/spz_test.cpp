@@ -79,12 +79,13 @@ TEST(Spz, AFlagTellsAntialiasedScenes) {
 
 TEST(Spz, LargeScenesKeepTheirExtentWithFewerFractionalBits) {
   GaussianCloud cloud = random_cloud(1000, 0);
-  cloud.mean[7] = glm::vec3(100000.0f, -1.0f, 5.0f);
+  // Too many to be far from all others.
+  for (std::size_t i = 0; i < 20; ++i) cloud.mean[i] = glm::vec3(100000.0f, -1.0f, 5.0f);
   std::ostringstream out;
   write_spz(cloud, out);
   const GaussianCloud read = parse(out.str()).cloud;
   EXPECT_NEAR(read.mean[7].x, 100000.0f, 1.0f / 128);
-  cloud.mean[7].x = 1e7f;
+  for (std::size_t i = 0; i < 20; ++i) cloud.mean[i].x = 1e7f;
   input_error([&] { write_spz(cloud, out); });
 }
 
@@ -119,6 +120,8 @@ TEST(Spz, LossesAreTold) {
                 for (glm::vec3& scale : cloud.scale) scale = glm::vec3(0.05f);
               }),
               ElementsAre(HasSubstr("steps of up to 0.0625, and 400 of 400 Gaussians")));
+  EXPECT_THAT(losses_with([](GaussianCloud& cloud) { cloud.mean[3].y = -2e6f; }),
+              ElementsAre(HasSubstr("1 of 400 Gaussians are far from all others")));
   EXPECT_THAT(losses_with([](GaussianCloud& cloud) { cloud.scale[3].y = 4000.0f; }),
               ElementsAre(HasSubstr("1 of 400 Gaussians are larger than 39")));
   EXPECT_THAT(losses_with([](GaussianCloud& cloud) {
@@ -147,6 +150,21 @@ TEST(Spz, NotesTellWhatAFileLeavesOpen) {
   std::string flags = encode_spz(cloud, {.version = 4, .coordinate_system = 6});
   flags[14] = static_cast<char>(flags[14] | 0x14);
   EXPECT_THAT(parse(flags).notes, ElementsAre(HasSubstr("flags 0x14"), HasSubstr("extension")));
+}
+
+TEST(Spz, AFarGaussianCostsTheOthersNothing) {
+  GaussianCloud cloud = storable_cloud(300, 0);
+  cloud.mean[7] = {0.0f, -2e6f, 0.0f};
+  std::ostringstream out;
+  write_spz(cloud, out);
+  const SpzFile read = parse(out.str());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (i == 7) continue;
+    for (int k = 0; k < 3; ++k)
+      EXPECT_NEAR(read.cloud.mean[i][k], cloud.mean[i][k], std::ldexp(1.0f, -17));
+  }
+  EXPECT_LT(read.cloud.mean[7].y, -1.0f);
+  EXPECT_LT(read.cloud.scale[7].x, 1e-4f);
 }
 
 TEST(Spz, TheAxesExtensionIsObeyed) {

@@ -62,8 +62,8 @@ class SomePages {
   std::vector<float> shown_;
 };
 
-/// The largest error in px over the cameras that may see a node, from the eight corners of its box;
-/// negative: it is outside.
+/// The largest error in px over the cameras that may see a node, from the eight corners of its box
+/// and its distance; negative: it is outside.
 float brute_error_px(const NodeFacts& facts, std::span<const Camera> cameras) {
   float largest = -1.0f;
   for (const Camera& camera : cameras) {
@@ -75,8 +75,13 @@ float brute_error_px(const NodeFacts& facts, std::span<const Camera> cameras) {
       const glm::vec3 at = facts.bounds.centre + sign * facts.bounds.half_extent;
       nearest = std::min(nearest, (rotation * (at - camera.world_from_camera.position)).z);
     }
-    largest = std::max(largest, nearest > camera.near_z ? facts.error * camera.focal_px.x / nearest
-                                                        : std::numeric_limits<float>::infinity());
+    const glm::vec3 &from = camera.world_from_camera.position, &centre = facts.bounds.centre;
+    const glm::vec3 closest =
+        glm::clamp(from, centre - facts.bounds.half_extent, centre + facts.bounds.half_extent);
+    const glm::vec2 half(glm::vec2(camera.size_px) * 0.5f / camera.focal_px);
+    nearest = std::max(
+        nearest, glm::distance(from, closest) * glm::normalize(glm::vec3(1.3f * half, 1.0f)).z);
+    largest = std::max(largest, facts.error * camera.focal_px.x / std::max(nearest, camera.near_z));
   }
   return largest;
 }
@@ -128,6 +133,30 @@ void expect_sound(const SomePages& tree, std::span<const Camera> cameras, float 
     }
     ASSERT_NEAR(sum, 1.0f, 0.02f) << "leaf " << leaf;
   }
+}
+
+TEST(Cut, ErrorsBoundThoseOfAllPointsInView) {
+  const Camera camera = make_camera(look_at({0, 0, 0}, {0, 0, 5}), {640, 360}, 300.0f);
+  const CutEye eye(camera);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> uniform(-1.0f, 1.0f);
+  const auto vector = [&] { return glm::vec3(uniform(random), uniform(random), uniform(random)); };
+  int beside = 0, in_view = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Cluster box{8.0f * vector(), glm::abs(3.0f * vector()), 0.1f};
+    const float bound_px = eye.error_px(0.01f, box);
+    // Boxes beside the camera that cross its plane.
+    beside += box.centre.z < box.half_extent.z && bound_px < 1e6f ? 1 : 0;
+    for (int k = 0; k < 100; ++k) {
+      const glm::vec3 at = box.centre + box.half_extent * vector();
+      const glm::vec2 px = 300.0f * glm::vec2(at) / at.z;
+      if (at.z <= camera.near_z || std::abs(px.x) > 320.0f || std::abs(px.y) > 180.0f) continue;
+      ++in_view;
+      ASSERT_LE(0.01f * 300.0f / at.z, bound_px * 1.0001f);
+    }
+  }
+  EXPECT_GT(beside, 100);
+  EXPECT_GT(in_view, 1000);
 }
 
 std::vector<Camera> cameras_around() {

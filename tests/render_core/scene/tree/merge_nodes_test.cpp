@@ -57,26 +57,32 @@ GaussianCloud gaussians_of(std::span<const Node> nodes, int degree) {
   return cloud;
 }
 
-/// PSNR of a node against others, both drawn by the oracle from where the node's error is
-/// `error_px` in an image of 64x64 px. What is behind has another colour than any Gaussian.
+constexpr float focal_px = 200.0f;
+
+/// Nodes in an image of 64x64 px, drawn by the oracle before a background, so far from a box that
+/// the distance to it is `distance`.
+std::vector<float> draw(std::span<const Node> nodes, int degree, const Cluster& bounds,
+                        float distance, const glm::vec3& background) {
+  const auto renderer =
+      make_reference_renderer(std::make_shared<const GaussianCloud>(gaussians_of(nodes, degree)),
+                              std::make_shared<ThreadPool>(2));
+  const auto view = renderer->make_view({});
+  const glm::vec3 from =
+      bounds.centre - glm::vec3(0.3f, 0.2f, 1.0f) * (distance + glm::length(bounds.half_extent));
+  return test::render_in(*view, {.camera = make_camera(test::look_at(from, bounds.centre), {64, 64},
+                                                       focal_px, 1e-3f),
+                                 .background = background})
+      .rgb;
+}
+
+/// PSNR of a node against others, both drawn from where the node's error is `error_px`. What is
+/// behind has another colour than any Gaussian.
 double psnr_from_error(const Node& node, std::span<const Node> others, int degree, float error_px) {
-  constexpr float focal_px = 200.0f;
-  const auto draw = [&](GaussianCloud cloud) {
-    const float distance = node.facts.error * focal_px / error_px;
-    const auto pool = std::make_shared<ThreadPool>(2);
-    const auto renderer =
-        make_reference_renderer(std::make_shared<const GaussianCloud>(std::move(cloud)), pool);
-    const auto view = renderer->make_view({});
-    const Cluster& bounds = node.facts.bounds;
-    const glm::vec3 from =
-        bounds.centre - glm::vec3(0.3f, 0.2f, 1.0f) * (distance + glm::length(bounds.half_extent));
-    return test::render_in(*view, {.camera = make_camera(test::look_at(from, bounds.centre),
-                                                         {64, 64}, focal_px, 1e-3f),
-                                   .background = {0.1f, 0.9f, 0.2f}})
-        .rgb;
+  const float distance = node.facts.error * focal_px / error_px;
+  const auto from_there = [&](std::span<const Node> nodes) {
+    return draw(nodes, degree, node.facts.bounds, distance, {0.1f, 0.9f, 0.2f});
   };
-  return test::psnr_db(draw(gaussians_of(std::span(&node, 1), degree)),
-                       draw(gaussians_of(others, degree)));
+  return test::psnr_db(from_there(std::span(&node, 1)), from_there(others));
 }
 
 /// A wall with a pattern, in the order of the curve: what captures consist of.
@@ -150,6 +156,45 @@ TEST(MergeNodes, MomentsAndProjectedAreaAreKept) {
   EXPECT_NEAR(out.opacity[0], 0.8 * before / area, 1e-3);
   EXPECT_EQ(out.mean[1], cloud.mean[1]);  // alone
   EXPECT_EQ(node.facts.error, 0.0f);      // of 0.9 of its Gaussians
+}
+
+// A wall as captures have it: opaque, in layers that hide each other.
+TEST(MergeNodes, ClosedSurfacesStayClosedThroughLevels) {
+  GaussianCloud cloud = wall(16 * 256);
+  for (std::size_t i = 0; i < cloud.size(); ++i) cloud.opacity[i] = 0.7f + 0.29f * cloud.opacity[i];
+  std::vector<Node> leaves;
+  for (std::size_t first = 0; first < cloud.size(); first += 256)
+    leaves.push_back(leaf(cloud, first, 256));
+  std::vector<Node> level = leaves;
+  for (int l = 1; l <= 4; ++l) {
+    std::vector<Node> above;
+    for (std::size_t i = 0; i + 1 < level.size(); i += 2)
+      above.push_back(merged(level[i], level[i + 1], 1));
+    level = std::move(above);
+    const Cluster& bounds = level[0].facts.bounds;
+    const auto leak = [&](std::span<const Node> nodes) {
+      const auto before = [&](float grey) { return draw(nodes, 1, bounds, 0.5f, glm::vec3(grey)); };
+      const std::vector<float> dark = before(0.0f), bright = before(1.0f);
+      double sum = 0.0;
+      for (std::size_t i = 0; i < dark.size(); ++i) sum += double{bright[i]} - double{dark[i]};
+      return sum / static_cast<double>(dark.size());
+    };
+    const auto under = std::span(leaves).first(leaves.size() / level.size());
+    EXPECT_LT(leak(std::span(level).first(1)), leak(under) + 0.06) << "level " << l;
+  }
+}
+
+// Such a Gaussian does not decide how the others are grouped.
+TEST(MergeNodes, AHugeOrFarGaussianCostsTheOthersNothing) {
+  const GaussianCloud cloud = wall(512);
+  const auto error_of = [](const GaussianCloud& of) {
+    return merged(leaf(of, 0, 256), leaf(of, 256, 256), 1).facts.error;
+  };
+  GaussianCloud huge = cloud, far = cloud;
+  huge.scale[100] = glm::vec3(1e4f);
+  far.mean[100] = glm::vec3(1e6f);
+  EXPECT_LT(error_of(huge), 1.1f * error_of(cloud));
+  EXPECT_LT(error_of(far), 1.1f * error_of(cloud));
 }
 
 TEST(MergeNodes, BoundsAndErrorsHoldThoseOfTheChildren) {

@@ -65,7 +65,8 @@ TEST_F(TreeFileTest, HeaderFieldsAreChecked) {
   };
   for (const Header& header : std::vector<Header>{
            {[](auto& h) { h.magic[0] = 'x'; }, "magic"},
-           {[](auto& h) { h.version = 2; }, "version"},
+           {[](auto& h) { h.version = 0; }, "version"},
+           {[](auto& h) { h.version = 3; }, "version"},
            {[](auto& h) { h.sh_degree = 4; }, "SH degree"},
            {[](auto& h) { h.gaussians = 0; }, "Gaussians"},
            {[](auto& h) { h.gaussians = (std::uint64_t{1} << 34) + 1; }, "Gaussians"},
@@ -167,6 +168,38 @@ TEST_F(TreeFileTest, ErrorsAndBoundsGrowTowardsTheRoot) {
   above.error = 0.0f;
   EXPECT_EQ(tree.page(leaves, &above), nullptr);
   EXPECT_THAT(tree.damage().first, HasSubstr("error of node 4.0"));
+}
+
+// Records of version 1 have no octaves: all bits of an opacity are its own.
+TEST_F(TreeFileTest, TreesOfTheFirstVersionAreRead) {
+  const GaussianCloud cloud = random_cloud(200, 3);
+  const GaussianCloud now = read(tree_bytes(cloud, pool_)).cloud;
+  std::string bytes = tree_bytes(cloud, pool_);
+  auto header = load_as<TreeHeader>(std::as_bytes(std::span(bytes)).data());
+  header.version = TreeHeader::first_version;
+  header.checksum = header.right_checksum();
+  std::memcpy(bytes.data(), &header, sizeof header);
+  std::vector<float> octaves, opacities;
+  bytes = with_page(bytes, 0, [&](TreePage& page) {
+    for (std::uint32_t i = 0; i < 200; ++i) {
+      std::byte* const at = &page.block(0)[packed_offset(0, 16, i) + 12];
+      std::uint16_t level = 0;
+      std::memcpy(&level, at, sizeof level);
+      octaves.push_back(packed_sh_octave(level));
+      level = static_cast<std::uint16_t>(300 * i);
+      opacities.push_back(std::exp2(unpack_log2_opacity(level)));
+      std::memcpy(at, &level, sizeof level);
+    }
+  });
+  EXPECT_GT(std::ranges::max(octaves), std::ranges::min(octaves));
+  const GaussianCloud first = read(bytes).cloud;
+  ASSERT_EQ(first.size(), 200u);
+  for (std::size_t i = 0; i < 200; ++i) {
+    EXPECT_NEAR(first.opacity[i], opacities[i], 0.0014f * opacities[i]);
+    for (int k = 0; k < 16; ++k)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_FLOAT_EQ(first.sh_of(i)[k][c] * (k == 0 ? 1.0f : octaves[i]), now.sh_of(i)[k][c]);
+  }
 }
 
 TEST_F(TreeFileTest, PagesOfOtherPlacesAreNotTaken) {
