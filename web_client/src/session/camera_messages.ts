@@ -1,12 +1,13 @@
 // Converts cameras and scenes between the client and the wire.
-import { add, type Vec3 } from '../base/vector';
-import type { Eye, Pose } from '../camera/eye';
-import { camera_modes, type CameraMode } from '../camera/mode';
-import type { SceneSetup } from '../camera/scene_setup';
-import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
+import { add, dot, scale, sub, type Vec3 } from "../base/vector";
+import type { ClipPlane, Eye, Pose } from "../camera/eye";
+import { camera_modes, type CameraMode } from "../camera/mode";
+import type { Ray } from "../camera/ray";
+import type { SceneSetup } from "../camera/scene_setup";
+import type { FrameHeader, PoseInit, SceneFacts } from "../wire/wire";
 
-type WireVector = Pick<NonNullable<SceneFacts['up']>, 'x' | 'y' | 'z'>;
-type WirePose = NonNullable<FrameHeader['renderPose']>;
+type WireVector = Pick<NonNullable<SceneFacts["up"]>, "x" | "y" | "z">;
+type WirePose = NonNullable<FrameHeader["renderPose"]>;
 
 export function pose_message(
   pose_id: number,
@@ -42,10 +43,52 @@ export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
 }
 
 /** The same pose about another point than 0; `by` leads from there to 0. */
-export const moved_by = <T extends Pose>(pose: T, by: Vec3): T => ({
+const moved_by = <T extends Pose>(pose: T, by: Vec3): T => ({
   ...pose,
   position: add(pose.position, by),
 });
+
+/** Between the page, which has the coordinates of the scene's file, and the wire, which is about the scene's origin. */
+export class SceneCoordinates {
+  private readonly origin_: Vec3;
+
+  constructor(scene?: SceneFacts) {
+    this.origin_ = vector_of(scene?.origin);
+  }
+
+  readonly point_message = (point: Vec3): ReturnType<typeof wire_vector> =>
+    wire_vector(sub(point, this.origin_));
+
+  readonly point_of = (v: WireVector): Vec3 => add(vector_of(v), this.origin_);
+
+  to_scene<T extends Pose>(pose: T): T {
+    return moved_by(pose, scale(this.origin_, -1));
+  }
+
+  to_file<T extends Pose>(pose: T): T {
+    return moved_by(pose, this.origin_);
+  }
+
+  header_in_file(header: FrameHeader): FrameHeader {
+    const { renderPose: pose } = header;
+    if (!pose?.position) return header;
+    const at = wire_vector(this.point_of(pose.position));
+    return { ...header, renderPose: { ...pose, position: { ...pose.position, ...at } } };
+  }
+
+  ray_message({ origin, direction }: Ray): Record<keyof Ray, ReturnType<typeof wire_vector>> {
+    return { origin: this.point_message(origin), direction: wire_vector(direction) };
+  }
+
+  clip_message(plane: ClipPlane | undefined): {
+    normal?: ReturnType<typeof wire_vector>;
+    offset?: number;
+  } {
+    if (!plane) return {};
+    const offset = plane.offset - dot(plane.normal, this.origin_);
+    return { normal: wire_vector(plane.normal), offset };
+  }
+}
 
 export function scene_setup(scene: SceneFacts): SceneSetup {
   const origin = vector_of(scene.origin);
