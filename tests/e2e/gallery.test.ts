@@ -139,7 +139,12 @@ const states: Readonly<Record<string, State>> = {
     reach: async (page) => {
       await settle(page);
       await page.evaluate(() =>
-        window.dispatchEvent(new ErrorEvent('error', { message: 'a planted fault' })),
+        window.dispatchEvent(
+          new ErrorEvent('error', {
+            message: 'a planted fault',
+            filename: document.querySelector<HTMLScriptElement>('script[type=module]')!.src,
+          }),
+        ),
       );
     },
     shown: button('Reload'),
