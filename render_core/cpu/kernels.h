@@ -30,7 +30,7 @@ struct alignas(64) Splat {
   float unused;
   float red, green, blue;
   float depth;  // world units along the view axis
-  std::uint32_t original_index;
+  std::uint32_t scene_order;
   std::uint16_t tile_x, tile_y, tile_end_x, tile_end_y;  // its box of tiles, end exclusive
   float rightmost_y;  // px below the centre: where the ellipse alpha >= alpha_min is rightmost
 };

@@ -129,7 +129,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     look.w = whitening(s.shape);
     look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
     look.depth = depth;
-    look.original_index = load_index(scene, i);
+    look.scene_order = load_index(scene, i);
     box.rightmost_y = rightmost_y(look.w, reach);
     const auto counted =
         mask_of_bits<hn::ScalableTag<float>>(hits) & (depth > Floats(task.min_depth));
@@ -178,7 +178,7 @@ inline ClusterSummary refresh_cluster(const RefreshTask& task) {
     look.w = whitening(shape);
     look.log2_opacity = look_of(scene, load_log2_opacity(scene, i, task.share), shape);
     look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
-    look.original_index = load_index(scene, i);
+    look.scene_order = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &
                             (look.depth > Floats(task.min_depth)),
                         look.depth);

@@ -56,7 +56,8 @@ SceneStore::SceneStore(const GaussianCloud& cloud, ThreadPool& pool)
       const glm::dquat q = glm::normalize(glm::dquat(cloud.rotation[i]));
       const double rotation[4] = {q.x, q.y, q.z, q.w};
       set(slot, cloud, i,
-          math::covariance_factor(rotation, math::Vec3<double>{scale.x, scale.y, scale.z}), i);
+          math::covariance_factor(rotation, math::Vec3<double>{scale.x, scale.y, scale.z}),
+          static_cast<std::uint32_t>(slot));
     }
     for (std::size_t slot = end; slot < std::min(padded_, first + cluster_size); ++slot) pad(slot);
     clusters_[c] = bound(first, end - first);
@@ -68,16 +69,16 @@ SceneStore::SceneStore(std::size_t clusters, int sh_degree, SplatModel model)
   allocate();
   // A huge page would take memory for the clusters of other slots.
   use_small_pages(attributes_.get(), attribute_count * padded_);
-  use_small_pages(original_index_.get(), padded_);
+  use_small_pages(scene_order_.get(), padded_);
   use_small_pages(sh_.get(), padded_ / packet_size * sh_floats_per_packet());
 }
 
 void SceneStore::allocate() {
   attributes_ = hwy::AllocateAligned<float>(std::max<std::size_t>(1, padded_ * attribute_count));
-  original_index_ = hwy::AllocateAligned<std::uint32_t>(std::max<std::size_t>(1, padded_));
+  scene_order_ = hwy::AllocateAligned<std::uint32_t>(std::max<std::size_t>(1, padded_));
   sh_ = hwy::AllocateAligned<float>(
       std::max<std::size_t>(1, padded_ / packet_size * sh_floats_per_packet()));
-  if (!attributes_ || !original_index_ || !sh_) throw std::bad_alloc();
+  if (!attributes_ || !scene_order_ || !sh_) throw std::bad_alloc();
   clusters_.resize(clusters_of(size_));
 }
 
@@ -97,7 +98,7 @@ void SceneStore::forget(std::size_t first_cluster, std::size_t clusters) {
   assert(first + count <= padded_);
   for (std::size_t a = 0; a < attribute_count; ++a)
     give_back(attributes_.get() + a * padded_ + first, count);
-  give_back(original_index_.get() + first, count);
+  give_back(scene_order_.get() + first, count);
   give_back(sh_.get() + first / packet_size * sh_floats_per_packet(),
             count / packet_size * sh_floats_per_packet());
 }
@@ -118,7 +119,7 @@ void SceneStore::set(std::size_t slot, const GaussianCloud& cloud, std::size_t i
       factor.yy, factor.zx, factor.zy, factor.zz, std::log2(static_cast<double>(cloud.opacity[i]))};
   for (std::size_t a = 0; a < attribute_count; ++a)
     attributes_[a * padded_ + slot] = static_cast<float>(values[a]);
-  original_index_[slot] = index;
+  scene_order_[slot] = index;
   float* const sh = sh_.get() + slot / packet_size * sh_floats_per_packet() + slot % packet_size;
   const int sh_count = sh_coefficient_count(sh_degree_);
   for (int k = 0; k < sh_count; ++k)
@@ -131,7 +132,7 @@ void SceneStore::pad(std::size_t slot) {
   for (std::size_t a = 0; a < attribute_count; ++a)
     attributes_[a * padded_ + slot] = attributes_[a * padded_ + slot - 1];
   attributes_[log2_opacity * padded_ + slot] = -std::numeric_limits<float>::infinity();
-  original_index_[slot] = original_index_[slot - 1];
+  scene_order_[slot] = scene_order_[slot - 1];
 }
 
 Cluster SceneStore::bound(std::size_t first, std::size_t count) const {

@@ -32,7 +32,7 @@ class SceneStore {
   SceneStore(std::size_t clusters, int sh_degree, SplatModel model);
 
   /// Fills cluster `c` with the first cluster_size Gaussians of `cloud` or less. `factors`: of
-  /// their covariances. `first_index`: original_index() of the first one. Different clusters may be
+  /// their covariances. `first_index`: scene_order() of the first one. Different clusters may be
   /// filled by several threads.
   void put(std::size_t c, const GaussianCloud& cloud,
            std::span<const math::CovarianceFactor<double>> factors, std::uint32_t first_index);
@@ -66,8 +66,9 @@ class SceneStore {
   [[nodiscard]] const float* attribute(Attribute a) const {
     return attributes_.get() + static_cast<std::size_t>(a) * padded_;
   }
-  /// Index of each Gaussian in its scene, modulo 2^32; decides the order of equal depths.
-  [[nodiscard]] const std::uint32_t* original_index() const { return original_index_.get(); }
+  /// Place of each Gaussian in the order of its scene's clusters, modulo 2^32; decides the order of
+  /// equal depths.
+  [[nodiscard]] const std::uint32_t* scene_order() const { return scene_order_.get(); }
   /// SH of packet p: [coefficient][channel][lane], packet_size lanes.
   [[nodiscard]] const float* sh_of_packet(std::size_t p) const {
     assert(p * packet_size < padded_);
@@ -89,7 +90,7 @@ class SceneStore {
   int sh_degree_;
   SplatModel model_;
   hwy::AlignedFreeUniquePtr<float[]> attributes_;
-  hwy::AlignedFreeUniquePtr<std::uint32_t[]> original_index_;
+  hwy::AlignedFreeUniquePtr<std::uint32_t[]> scene_order_;
   hwy::AlignedFreeUniquePtr<float[]> sh_;
   std::vector<Cluster> clusters_;
 };

@@ -79,7 +79,7 @@ HWY_INLINE Floats load_log2_opacity(const SceneStore& scene, std::size_t i, floa
 HWY_INLINE Floats load_index(const SceneStore& scene, std::size_t i) {
   const hn::ScalableTag<float> d;
   const hn::RebindToUnsigned<decltype(d)> du;
-  return Floats(hn::BitCast(d, hn::Load(du, scene.original_index() + i)));
+  return Floats(hn::BitCast(d, hn::Load(du, scene.scene_order() + i)));
 }
 
 /// Colour of the Gaussians from `i` on, which share a packet.
@@ -185,7 +185,7 @@ struct SplatLook {
   Whitening<Floats> w;
   Floats log2_opacity;
   Vec3<Floats> colour;
-  Floats depth, original_index;
+  Floats depth, scene_order;
 };
 
 /// The fields that listing needs in addition.
@@ -215,7 +215,7 @@ HWY_INLINE void write_splats(const SplatLook& s, const SplatBox& box, std::uint3
   alignas(64) float splats[16 * Floats::count];
   interleave({s.centre_px.x, s.centre_px.y, s.w.xx, s.w.xy, s.w.yy, s.log2_opacity,
               box.half_extent_x, Floats(0.0), s.colour.x, s.colour.y, s.colour.z, s.depth,
-              s.original_index, pack_pair(box.columns.low, box.rows.low),
+              s.scene_order, pack_pair(box.columns.low, box.rows.low),
               pack_pair(box.columns.end, box.rows.end), box.rightmost_y},
              splats);
   for (; hits != 0; hits &= hits - 1)

@@ -10,9 +10,9 @@
 namespace catgs {
 namespace {
 
-/// Puts runs of equal keys into the order of the scene.
+/// Puts runs of equal keys into the order of the scene's clusters.
 void order_ties(std::span<const Splat> splats, std::span<CodedIndex> sorted) {
-  const auto original = [&](const CodedIndex& e) { return splats[e.value].original_index; };
+  const auto original = [&](const CodedIndex& e) { return splats[e.value].scene_order; };
   for (auto first = sorted.begin(); first != sorted.end();) {
     auto last = first + 1;
     while (last != sorted.end() && last->key == first->key) ++last;
@@ -32,7 +32,7 @@ std::span<DepthSlot> scratch_of(std::size_t size) {
 struct SceneOrder {
   std::span<const Splat> splats;
   bool operator()(const DepthSlot& a, const DepthSlot& b) const {
-    return splats[a.value].original_index < splats[b.value].original_index;
+    return splats[a.value].scene_order < splats[b.value].scene_order;
   }
 };
 

@@ -47,7 +47,7 @@ class TileLists {
   /// Builds the lists. Every splat of `table` must have been added once.
   void finish(const SplatTable& table, const SimdKernels& kernels, ThreadPool& pool);
 
-  /// Brings each list into depth order; equal depths keep the order of the scene.
+  /// Brings each list into depth order; equal depths keep that of the clusters.
   void sort(std::span<const Splat> splats, ThreadPool& pool);
 
   /// Lists and sorts in the original's way: a (tile | depth) key per splat and tile of its box, one

@@ -15,7 +15,7 @@ constexpr std::uint32_t most_depth_key = (1u << depth_bits) - 1u;
 
 /// Key of a view depth; 0 for one not beyond the near plane. Positive floats sort like their bits,
 /// so the keys are nearly logarithmic: 20 octaves from the near plane in steps of 1e-6. Splats
-/// within a step keep the scene's order.
+/// within a step keep the order of the scene's clusters.
 __host__ __device__ inline std::uint32_t depth_key(float depth, float near_z) {
   constexpr int octaves = 20, bits_per_octave = 23;
   constexpr std::uint64_t scale =

@@ -130,7 +130,8 @@ SceneHints estimate_upright(const GaussianCloud& cloud, const glm::vec3& up,
   const Sight sight = best_sight(inside, content, up, judge);
 
   const auto& [min, max] = content.bounds;
-  const float radius = std::max(0.5f * glm::distance(min, max), 1e-3f);
+  // Limits on both sides of a lone Gaussian differ, however far away it is.
+  const float radius = std::max({0.5f * glm::distance(min, max), 1e-3f, 1e-6f * glm::length(max)});
   const glm::vec3& start = sight.pose.position;
   SceneHints hints;
   hints.up = up;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
@@ -53,13 +54,19 @@ class PngFile {
   PngFile(const PngFile&) = delete;
   PngFile& operator=(const PngFile&) = delete;
 
-  void begin(glm::ivec2 size_px, int colour_type) {
+  void begin(glm::ivec2 size_px, int colour_type, const PngText& text) {
+    std::string key = text.key, words = text.text;
+    png_text chunk{};
+    chunk.compression = PNG_TEXT_COMPRESSION_NONE;
+    chunk.key = key.data();
+    chunk.text = words.data();
     attempt([&] {
       png_init_io(png_, file_.get());
       png_set_IHDR(png_, info_, static_cast<png_uint_32>(size_px.x),
                    static_cast<png_uint_32>(size_px.y), 8, colour_type, PNG_INTERLACE_NONE,
                    PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
       png_set_sRGB(png_, info_, PNG_sRGB_INTENT_PERCEPTUAL);
+      if (!key.empty()) png_set_text(png_, info_, &chunk, 1);
       png_write_info(png_, info_);
     });
   }
@@ -103,9 +110,9 @@ class PngFile {
 /// `row_of(y)` is read before the next call.
 template <typename RowOf>
 void write_rows(const std::filesystem::path& path, glm::ivec2 size_px, int colour_type,
-                const RowOf& row_of, const AfterRow& after_row) {
+                const RowOf& row_of, const AfterRow& after_row, const PngText& text = {}) {
   PngFile file(path);
-  file.begin(size_px, colour_type);
+  file.begin(size_px, colour_type, text);
   for (int y = 0; y < size_px.y; ++y) {
     file.write_row(row_of(y));
     if (after_row) after_row();
@@ -124,23 +131,47 @@ Image read_png(const std::filesystem::path& path) {
     throw InputError(path.string(), "size", fmt::format("{}x{} pixels", png.width, png.height),
                      fmt::format("at most {} per side", max_image_side_px));
   }
-  png.format = PNG_FORMAT_RGB;
+  png.format = PNG_FORMAT_RGBA;
   png.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;
   std::vector<std::uint8_t> bytes(PNG_IMAGE_SIZE(png));
-  const png_color black{0, 0, 0};
-  if (png_image_finish_read(&png, &black, bytes.data(), 0, nullptr) == 0) {
+  if (png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr) == 0) {
     throw InputError(path.string(), "", png.message, "the file is damaged");
   }
   Image image;
   image.size_px = {static_cast<int>(png.width), static_cast<int>(png.height)};
-  image.rgb.resize(bytes.size());
-  std::ranges::transform(bytes, image.rgb.begin(),
-                         [](std::uint8_t byte) { return static_cast<float>(byte) / 255.0f; });
+  image.rgb.reserve(bytes.size() / 4 * 3);
+  for (std::size_t i = 0; i < bytes.size(); i += 4)
+    for (std::size_t c = 0; c < 3; ++c)
+      image.rgb.push_back(static_cast<float>(bytes[i + c]) / 255.0f *
+                          (static_cast<float>(bytes[i + 3]) / 255.0f));
   return image;
 }
 
+std::string text_in_png(const std::filesystem::path& path, std::string_view key) {
+  constexpr std::size_t signature_bytes = 8, chunk_head_bytes = 8, checksum_bytes = 4;
+  constexpr std::size_t most_text_bytes = 4096;
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(signature_bytes);
+  std::array<char, chunk_head_bytes> head{};
+  while (file.read(head.data(), head.size())) {
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; i < 4; ++i) bytes = bytes << 8 | static_cast<unsigned char>(head[i]);
+    const std::string_view type(head.data() + 4, 4);
+    if (type == "IDAT") break;
+    if (type != "tEXt" || bytes > most_text_bytes) {
+      file.seekg(static_cast<std::streamoff>(bytes + checksum_bytes), std::ios::cur);
+      continue;
+    }
+    std::string content(bytes, '\0');
+    if (!file.read(content.data(), static_cast<std::streamsize>(bytes))) break;
+    if (content.starts_with(std::string(key) + '\0')) return content.substr(key.size() + 1);
+    file.seekg(checksum_bytes, std::ios::cur);
+  }
+  return {};
+}
+
 void write_png(const std::filesystem::path& path, const Image& image, std::span<const float> alpha,
-               const AfterRow& after_row) {
+               const AfterRow& after_row, const PngText& text) {
   assert(alpha.empty() || alpha.size() == image.pixels());
   const auto width = static_cast<std::size_t>(image.size_px.x);
   std::vector<std::uint8_t> bytes;
@@ -156,7 +187,7 @@ void write_png(const std::filesystem::path& path, const Image& image, std::span<
     return bytes.data();
   };
   write_rows(path, image.size_px, alpha.empty() ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA,
-             row_of, after_row);
+             row_of, after_row, text);
 }
 
 void write_png(const std::filesystem::path& path, glm::ivec2 size_px,

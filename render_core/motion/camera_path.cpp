@@ -45,14 +45,9 @@ CameraPath timed(const fs::path& path, const std::vector<ListedCamera>& cameras,
   CameraPath result;
   for (const ListedCamera& listed : cameras) {
     const auto time_us = std::llround(static_cast<double>(result.poses.size()) / rate_hz * 1e6);
-    result.poses.push_back({time_us, listed.camera.world_from_camera});
-  }
-  const Camera& first = cameras.front().camera;
-  result.lenses_differ = !std::ranges::all_of(
-      cameras, [&](const ListedCamera& listed) { return same_lens(listed.camera, first); });
-  if (!result.lenses_differ && first.size_px.x > 0) {
-    result.lens = first;
-    result.lens->world_from_camera = {};
+    result.poses.push_back({time_us, listed.world_from_camera});
+    result.names.push_back(listed.name);
+    result.lenses.push_back(listed.lens);
   }
   return result;
 }

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <string>
+#include <vector>
 
-#include "render_core/math/camera.h"
+#include "render_core/math/lens.h"
 #include "render_core/motion/trajectory.h"
 
 namespace catgs {
@@ -11,15 +12,13 @@ namespace catgs {
 /// A camera's path as a file describes it.
 struct CameraPath {
   Trajectory poses;
+  // One for each pose; empty where the form of the file has none.
+  std::vector<std::string> names{};  // of pictures, as the file writes them; may be empty
+  std::vector<Lens> lenses{};
   glm::dvec3 origin{0.0};  // that the poses are about; the file counts from 0
 
   /// The poses about the origin of a scene.
   [[nodiscard]] Trajectory poses_about(const glm::dvec3& scene_origin) const;
-
-  // The lens that the whole path was taken with, without its pose; empty where the file says
-  // nothing of it.
-  std::optional<Camera> lens;
-  bool lenses_differ = false;  // the cameras have several lenses; `lens` is empty
 };
 
 /// Poses per second of a path whose file has no times, unless the caller knows better.

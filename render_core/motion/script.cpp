@@ -53,7 +53,6 @@ void check_sampling(double duration_s, double rate_hz) {
 
 PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame,
                     const glm::dvec3& origin) {
-  constexpr std::string_view tour_prefix = "tour:";
   const std::string_view script = options.script;
   if (script == "orbit") return orbit_script(frame, options.seed);
   if (script == "walk") return walk_script(frame, options.seed, options.duration_s);
@@ -63,14 +62,8 @@ PoseAt make_pose_at(const ScriptOptions& options, const SceneFrame& frame,
     const Pose pose{frame.inside(frame.start()), glm::quat(frame.start_orientation())};
     return [pose](double) { return pose; };
   }
-  if (script.starts_with(tour_prefix)) {
-    const std::string_view file = script.substr(tour_prefix.size());
-    if (file.empty()) {
-      throw InputError("--script", "", "tour: names no file",
-                       "tour:FILE, a camera path of keyframes");
-    }
-    return tour_script(frame, read_camera_path(file).poses_about(origin));
-  }
+  if (const auto file = tour_file(script))
+    return tour_script(frame, read_camera_path(*file).poses_about(origin));
   throw InputError("--script", "", fmt::format("unknown script \"{}\"", script),
                    "one of orbit, walk, head, drone, still, tour:FILE");
 }
@@ -135,6 +128,15 @@ Trajectory sample(const PoseAt& pose_at, double duration_s, double rate_hz) {
     trajectory.push_back({static_cast<std::int64_t>(time_s * 1e6 + 0.5), pose});
   }
   return trajectory;
+}
+
+std::optional<std::string_view> tour_file(std::string_view script) {
+  constexpr std::string_view prefix = "tour:";
+  if (!script.starts_with(prefix)) return std::nullopt;
+  if (script == prefix)
+    throw InputError("--script", "", "tour: names no file",
+                     "tour:FILE, a camera path of keyframes");
+  return script.substr(prefix.size());
 }
 
 Trajectory make_script(const ScriptOptions& options, const SceneHints& hints) {

@@ -16,6 +16,7 @@
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
+#include "render_core/scene/clusters.h"
 
 namespace catgs {
 namespace {
@@ -44,11 +45,12 @@ math::Vec3<double> shade(const GaussianCloud& cloud, std::size_t i,
 }
 
 /// Every Gaussian in front of the near plane that can reach alpha_min, front to back; equal depths
-/// keep the order of the scene.
-std::vector<ReferenceSplat> project_all(const GaussianCloud& cloud, const Camera& request_camera) {
+/// keep the order of the scene's clusters.
+std::vector<ReferenceSplat> project_all(const GaussianCloud& cloud, const Camera& request_camera,
+                                        ThreadPool& pool) {
   const auto camera = math::make_camera_model(request_camera);
   std::vector<ReferenceSplat> splats;
-  for (std::size_t i = 0; i < cloud.size(); ++i) {
+  for (const std::uint32_t i : morton_order(cloud.mean, pool)) {
     const auto mean = to_vec3(cloud.mean[i]);
     const double depth = math::view_depth(camera, mean);
     ReferenceSplat splat;
@@ -117,7 +119,7 @@ PixelColours render_pixels(const GaussianCloud& cloud, const FrameRequest& reque
   };
   PixelColours out;
   const auto start = Clock::now();
-  const std::vector<ReferenceSplat> splats = project_all(cloud, request.camera);
+  const std::vector<ReferenceSplat> splats = project_all(cloud, request.camera, pool);
   out.stats.visible = static_cast<std::uint32_t>(splats.size());
   out.stats.stage_ms[static_cast<std::size_t>(Stage::project)] = ms_since(start);
 

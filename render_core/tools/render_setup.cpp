@@ -21,7 +21,30 @@
 namespace catgs {
 namespace {
 
-/// The recorded or scripted path. Only a file may name a lens.
+double mean_rate_hz(const Trajectory& path) {
+  if (path.size() < 2) return 1.0;
+  return static_cast<double>(path.size() - 1) * 1e6 /
+         static_cast<double>(path.back().time_us - path.front().time_us);
+}
+
+const std::string& path_file(const RenderOptions& options) {
+  return options.trace.empty() ? options.script : options.trace;
+}
+
+/// Makes the path that of the frames: other poses than those of its file have no names, and one
+/// lens.
+void follow(CameraPath& path, const RenderOptions& options, Trajectory poses) {
+  path.poses = std::move(poses);
+  path.names.clear();
+  if (path.lenses.empty()) return;
+  const auto differs = [&](const Lens& lens) { return lens != path.lenses.front(); };
+  if (std::ranges::any_of(path.lenses, differs) && !options.lens.view_given())
+    throw InputError(path_file(options), "", "its cameras have several lenses",
+                     "draw pictures without --fps, or choose one with --fov-deg or --focal-px");
+  path.lenses.resize(1);
+}
+
+/// The recorded or scripted path. A tour has the lens of its keyframes, if they have one.
 CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
   if (options.trace.empty() == options.script.empty()) {
     throw InputError("--trace, --script", "", "one of them is needed",
@@ -29,7 +52,8 @@ CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
   }
   CameraPath path;
   if (!options.script.empty()) {
-    path.poses = make_script(script_options(options), hints);
+    if (const auto keyframes = tour_file(options.script)) path = read_camera_path(*keyframes);
+    follow(path, options, make_script(script_options(options), hints));
   } else {
     path = read_camera_path(options.trace, options.trace_rate_hz);
     path.poses = options.anchor ? anchored(path.poses, hints) : path.poses_about(hints.origin);
@@ -37,21 +61,31 @@ CameraPath make_path(const RenderOptions& options, const SceneHints& hints) {
   return path;
 }
 
-double mean_rate_hz(const Trajectory& path) {
-  if (path.size() < 2) return 1.0;
-  return static_cast<double>(path.size() - 1) * 1e6 /
-         static_cast<double>(path.back().time_us - path.front().time_us);
+void select_frames(CameraPath& path, const FrameRange& range) {
+  const auto select = [&, count = path.poses.size()](auto& values) {
+    if (values.size() != count) return;
+    values.erase(values.begin() + static_cast<std::ptrdiff_t>(range.end), values.end());
+    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(range.begin));
+  };
+  select(path.names);
+  select(path.lenses);
+  select(path.poses);
 }
 
-void use_path(RenderSetup& setup, const RenderOptions& options, Trajectory samples) {
-  setup.samples = std::move(samples);
-  const bool resampled = options.fps && !options.trace.empty();
-  const Trajectory path = resampled ? resample(setup.samples, *options.fps) : setup.samples;
-  const FrameRange range = parse_frame_range(options.frames, path.size());
+/// Returns the lenses of the frames: one for each, or one, or none.
+std::vector<Lens> use_path(RenderSetup& setup, const RenderOptions& options, CameraPath path) {
+  setup.samples = path.poses;
+  std::optional<double> fps = options.fps;
+  if (!fps && options.most_fps && mean_rate_hz(path.poses) > *options.most_fps)
+    fps = options.most_fps;
+  if (fps && !options.trace.empty()) follow(path, options, resample(setup.samples, *fps));
+  setup.fps = fps.value_or(mean_rate_hz(path.poses));
+  const FrameRange range = parse_frame_range(options.frames, path.poses.size());
   setup.first = range.begin;
-  setup.poses.assign(path.begin() + static_cast<std::ptrdiff_t>(range.begin),
-                     path.begin() + static_cast<std::ptrdiff_t>(range.end));
-  setup.fps = options.fps.value_or(mean_rate_hz(path));
+  select_frames(path, range);
+  setup.poses = std::move(path.poses);
+  setup.names = std::move(path.names);
+  return std::move(path.lenses);
 }
 
 }  // namespace
@@ -60,8 +94,8 @@ void add_render_options(CLI::App& command, RenderOptions& options) {
   add_scene_options(command, options.scene);
   auto* trace = command.add_option(
       "--trace", options.trace,
-      fmt::format("Camera path: {}. Its lens is used unless --size, --fov-deg or "
-                  "--focal-px is given",
+      fmt::format("Camera path: {}. Its size and its lens are used unless --size, and --fov-deg or "
+                  "--focal-px, are given",
                   camera_path_forms));
   auto* script = command.add_option("--script", options.script,
                                     "Camera path: orbit, walk, head, drone, still or tour:FILE");
@@ -118,7 +152,7 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
 FrameRequest RenderSetup::request(std::size_t i) const {
   assert(i < poses.size());
   FrameRequest request;
-  request.camera = camera;
+  request.camera = lenses.empty() ? camera : lenses[i];
   request.camera.world_from_camera = poses[i].world_from_camera;
   request.background = background;
   request.detail_px = detail_px;
@@ -161,18 +195,10 @@ void refuse_script_options(const RenderOptions& options) {
 RenderSetup prepare(const RenderOptions& options, bool quiet) {
   if (!options.trace.empty()) refuse_script_options(options);
   RenderSetup setup = prepare_scene(options, quiet);
-  CameraPath path = make_path(options, setup.scene.hints);
-  if (!options.lens.given()) {
-    if (path.lenses_differ)
-      throw InputError(options.trace, "", "its cameras have several lenses",
-                       "choose one with --size and --fov-deg or --focal-px");
-    if (path.lens) {
-      path.lens->near_z = setup.camera.near_z;
-      path.lens->clip = setup.camera.clip;
-      setup.camera = *path.lens;
-    }
-  }
-  use_path(setup, options, std::move(path.poses));
+  const std::vector<Lens> lenses = use_path(setup, options, make_path(options, setup.scene.hints));
+  setup.lenses = make_lenses(options.lens, setup.scene.hints.near_z, path_file(options), lenses);
+  setup.camera = setup.lenses.front();
+  if (setup.lenses.size() == 1) setup.lenses.clear();
   return setup;
 }
 
@@ -201,7 +227,9 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
 }
 
 void set_path(RenderSetup& setup, const RenderOptions& options) {
-  use_path(setup, options, make_path(options, setup.scene.hints).poses);
+  RenderOptions poses_only = options;
+  if (!options.lens.view_given()) poses_only.lens.fov_y_deg = default_fov_y_deg;
+  (void)use_path(setup, poses_only, make_path(poses_only, setup.scene.hints));
 }
 
 RendererOptions renderer_options(const RenderOptions& options) {

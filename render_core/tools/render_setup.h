@@ -30,6 +30,7 @@ struct RenderOptions {
   std::optional<double> duration_s;
   LensOptions lens;
   std::optional<double> fps;
+  std::optional<double> most_fps;  // without `fps`: a trace with more is resampled
   std::string frames;
   std::string renderer = "auto";
   std::string device;  // empty: the first device, if CUDA renders
@@ -55,13 +56,15 @@ struct RenderSetup {
   float detail_px = 0.0f;
   std::shared_ptr<ThreadPool> pool;
   MadeRenderer made;
-  ViewSettings view;            // pipeline and its parts; callers set format and memory space
-  PredictorSettings predictor;  // of the paper pipeline's forecasts
-  Trajectory samples;           // the camera as recorded
-  Trajectory poses;             // one per frame
-  std::size_t first = 0;        // number of poses[0] in the whole path
-  double fps = 0.0;             // of the path
-  Camera camera;                // without the pose
+  ViewSettings view;               // pipeline and its parts; callers set format and memory space
+  PredictorSettings predictor;     // of the paper pipeline's forecasts
+  Trajectory samples;              // the camera as recorded
+  Trajectory poses;                // one per frame
+  std::size_t first = 0;           // number of poses[0] in the whole path
+  double fps = 0.0;                // of the path
+  std::vector<std::string> names;  // of the frames' pictures, as the path's file has them; or none
+  Camera camera;                   // without the pose; of the first frame
+  std::vector<Camera> lenses;      // one per frame, where the path has several; else empty
   glm::vec3 background{0.0f};
 
   /// The request for frame i alone, without a forecast; see FrameFeed. It waits for pages.
@@ -75,10 +78,11 @@ struct RenderSetup {
   [[nodiscard]] const GaussianCloud& whole_cloud(std::string_view flag) const;
 };
 
-/// Loads scene and path, makes the renderer. Without options of the lens, the lens is that of the
-/// path's file, if it has one. Throws InputError.
+/// Loads scene and path, makes the renderer. What the options of the lens leave open is taken from
+/// the path's file, if that has a lens. Throws InputError.
 RenderSetup prepare(const RenderOptions& options, bool quiet);
-/// Loads the scene, then set_path() a path; for several paths through one scene.
+/// Loads the scene, then set_path() a path; for several paths through one scene, which are all
+/// drawn with the lens of the options.
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet);
 void set_path(RenderSetup& setup, const RenderOptions& options);
 

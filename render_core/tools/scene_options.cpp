@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/base/printable.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/scene/files/load_scene.h"
@@ -16,8 +18,6 @@
 
 namespace catgs {
 namespace {
-
-constexpr float default_fov_y_deg = 60.0f;
 
 LoadOptions load_options(const SceneOptions& options, int threads, Progress& progress) {
   LoadOptions load;
@@ -83,13 +83,20 @@ SceneInPages open_in_pages(const SceneLocation& location, const SceneOptions& op
 }
 
 void add_lens_options(CLI::App& command, LensOptions& options) {
-  command.add_option("--size", options.size, "Width x height, pixels")
+  command
+      .add_option(
+          "--size", options.size,
+          "Width x height, pixels, in place of the size that a path's file tells. Another "
+          "shape keeps the lens's vertical angle, or the horizontal one if that is all that "
+          "the file tells")
       ->each([&options](const std::string&) { options.size_given = true; })
       ->capture_default_str();
   auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
   command
       .add_option("--fov-deg", options.fov_y_deg,
-                  fmt::format("Vertical field of view, degrees (default: {})", default_fov_y_deg))
+                  fmt::format("Vertical field of view, degrees (default: the lens of the path's "
+                              "file, or {})",
+                              default_fov_y_deg))
       ->excludes(focal);
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");
@@ -98,8 +105,9 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
                      "It takes the roof off a house");
 }
 
-Camera make_lens(const LensOptions& options, float hinted_near_z) {
-  const glm::ivec2 size_px = parse_size("--size", options.size);
+Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& lens) {
+  const bool own_size = !options.size_given && lens.size_px.x > 0;
+  const glm::ivec2 size_px = own_size ? lens.size_px : parse_size("--size", options.size);
   const float fov_y_rad =
       options.fov_y_deg.value_or(default_fov_y_deg) * std::numbers::pi_v<float> / 180.0f;
   const float focal_px = options.focal_px.value_or(focal_from_fov_y(fov_y_rad, size_px.y));
@@ -112,7 +120,9 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
                      fmt::format("{} is not a positive, finite distance", *options.near_z),
                      "world units; without it, the scene's hint");
   }
-  Camera camera = make_camera({}, size_px, focal_px, options.near_z.value_or(hinted_near_z));
+  Camera camera = lens.known() && !options.view_given() ? make_camera(lens, size_px)
+                                                        : make_camera({}, size_px, focal_px);
+  camera.near_z = options.near_z.value_or(hinted_near_z);
   if (!options.clip.empty()) {
     const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
     camera.clip = {glm::vec3(plane[0], plane[1], plane[2]), static_cast<float>(plane[3])};
@@ -121,6 +131,45 @@ Camera make_lens(const LensOptions& options, float hinted_near_z) {
                        "NX,NY,NZ points to what is left out, like 0,1,0");
   }
   return camera;
+}
+
+std::vector<Camera> make_lenses(const LensOptions& options, float hinted_near_z,
+                                const std::string& file, const std::vector<Lens>& lenses) {
+  if (lenses.empty()) return {make_lens(options, hinted_near_z)};
+  const Lens& first = lenses.front();
+  if (!options.size_given &&
+      !std::ranges::all_of(lenses, [&](const Lens& lens) { return lens.size_px == first.size_px; }))
+    throw InputError(file, "", "its pictures have several sizes", "choose one with --size");
+  if (options.view_given()) return {make_lens(options, hinted_near_z, first)};
+  const auto note = [&](const std::string& text) {
+    fmt::print(stderr, "note: {}: {}\n", printable(file), text);
+  };
+  const bool one_known = std::ranges::any_of(lenses, &Lens::known);
+  std::set<std::string_view> distortions;
+  for (const Lens& lens : lenses) {
+    if (!lens.known() && (one_known || !lens.distortion.empty()))
+      throw InputError(file, "",
+                       lens.distortion.empty()
+                           ? "some of its cameras tell no lens"
+                           : fmt::format("no perspective picture shows {}", lens.distortion),
+                       "choose one with --fov-deg or --focal-px");
+    if (!lens.distortion.empty()) distortions.insert(lens.distortion);
+  }
+  if (!distortions.empty())
+    note(fmt::format("drawn as a pinhole camera, without its {}{}", *distortions.begin(),
+                     distortions.size() > 1
+                         ? fmt::format(", and {} others without theirs", distortions.size() - 1)
+                         : ""));
+  std::vector<Camera> cameras;
+  for (const Lens& lens : lenses) cameras.push_back(make_lens(options, hinted_near_z, lens));
+  const bool alike = std::ranges::all_of(
+      cameras, [&](const Camera& camera) { return same_lens(camera, cameras.front()); });
+  if (alike) cameras.resize(1);
+  if (!one_known)
+    note(fmt::format("tells no lens; {} degrees are drawn (--fov-deg)", default_fov_y_deg));
+  else if (!options.size_given && first.size_px.x == 0)
+    note(fmt::format("tells no size; {} is drawn (--size)", options.size));
+  return cameras;
 }
 
 glm::ivec2 parse_size(std::string_view flag, std::string_view text) {

@@ -4,9 +4,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render_core/base/cli_fwd.h"
-#include "render_core/math/camera.h"
+#include "render_core/math/lens.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 
@@ -39,6 +40,8 @@ Scene load_scene(const SceneLocation& location, const SceneOptions& options, int
 SceneInPages open_in_pages(const SceneLocation& location, const SceneOptions& options, int threads,
                            bool quiet);
 
+inline constexpr float default_fov_y_deg = 60.0f;
+
 /// A camera without a pose.
 struct LensOptions {
   std::string size = "1280x720";
@@ -48,13 +51,20 @@ struct LensOptions {
   std::string clip{};  // "nx,ny,nz,offset"; empty: no clip plane
   bool size_given = false;
 
-  /// Whether the user has said anything about the picture's size or field of view.
-  [[nodiscard]] bool given() const { return size_given || focal_px || fov_y_deg; }
+  /// Whether the user has said anything about the field of view.
+  [[nodiscard]] bool view_given() const { return focal_px || fov_y_deg; }
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
 
-/// Without --near the near plane is `hinted_near_z`. Throws InputError.
-Camera make_lens(const LensOptions& options, float hinted_near_z);
+/// What the options leave open is taken from `lens`, as far as that is known. Without --near the
+/// near plane is `hinted_near_z`. Throws InputError.
+Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& lens = {});
+
+/// The cameras of the poses of a path that `file` describes, without their poses. One, where the
+/// path has one lens or none, or where the options tell the field of view. Says on stderr what
+/// people should know about the lenses. Throws InputError where a lens cannot be drawn with.
+std::vector<Camera> make_lenses(const LensOptions& options, float hinted_near_z,
+                                const std::string& file, const std::vector<Lens>& lenses);
 
 /// "1920x1080" -> (1920, 1080); sides of 1…max_image_side_px. `flag` names the source in errors.
 glm::ivec2 parse_size(std::string_view flag, std::string_view text);

@@ -61,7 +61,7 @@ std::string text_of(const std::optional<Sidecar>& sidecar) {
 
 std::string camera_facts(const HintFiles& hints) {
   std::string facts;
-  for (const auto& file : {hints.cameras, hints.transforms}) {
+  for (const auto& file : {hints.cameras, hints.transforms, hints.test_views}) {
     std::error_code none;
     const auto written_at = std::filesystem::last_write_time(file, none);
     facts += fmt::format("\n{}", none ? 0 : written_at.time_since_epoch().count());

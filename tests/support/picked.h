@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "render_core/base/thread_pool.h"
+#include "render_core/scene/clusters.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs::test {
@@ -23,6 +25,11 @@ inline GaussianCloud picked(const GaussianCloud& from, const std::vector<std::ui
     std::copy_n(from.sh_of(k), count, &to.sh[i * count]);
   }
   return to;
+}
+
+/// The cloud as cores hold it: cluster after cluster.
+inline GaussianCloud in_cluster_order(const GaussianCloud& cloud, ThreadPool& pool) {
+  return picked(cloud, morton_order(cloud.mean, pool));
 }
 
 }  // namespace catgs::test

@@ -32,15 +32,16 @@ CameraFile find_cameras(const HintFiles& files, std::vector<std::string>& notes)
     try {
       CameraFile found{path.filename().string(), {}};
       for (const ListedCamera& listed : read_camera_json(FileSource(path), files.origin).cameras)
-        found.poses.push_back(listed.camera.world_from_camera);
+        found.poses.push_back(listed.world_from_camera);
       return found;
     } catch (const InputError& e) {
       notes.push_back(fmt::format("not used: {}", e.what()));
       return {};
     }
   };
-  CameraFile cameras = try_file(files.cameras);
-  if (cameras.poses.empty()) cameras = try_file(files.transforms);
+  CameraFile cameras;
+  for (const auto* file : {&files.cameras, &files.transforms, &files.test_views})
+    if (cameras.poses.empty()) cameras = try_file(*file);
   return cameras;
 }
 
@@ -118,7 +119,7 @@ std::optional<Sidecar> sidecar_at(const HintFiles& files) {
 bool tell_anything(const HintFiles& files) {
   return files.orbit.has_value() ||
          std::ranges::any_of(
-             std::array{files.sidecar, files.cameras, files.transforms},
+             std::array{files.sidecar, files.cameras, files.transforms, files.test_views},
              [error = std::error_code()](const std::filesystem::path& path) mutable {
                return !path.empty() && std::filesystem::is_regular_file(path, error);
              });

@@ -75,6 +75,7 @@ struct HintFiles {
   std::filesystem::path cameras;
   std::filesystem::path transforms;
   std::optional<OrbitLimits> orbit{};  // of the scene's file
+  std::filesystem::path test_views{};  // transforms_test.json of a data set
   glm::dvec3 origin{0.0};              // of the scene; the files count from 0
 };
 

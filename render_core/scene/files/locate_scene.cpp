@@ -111,6 +111,7 @@ SceneLocation at_file(const fs::path& file) {
   location.hints.sidecar = sidecar_of(file);
   location.hints.cameras = folder / "cameras.json";
   location.hints.transforms = folder / "transforms.json";
+  location.hints.test_views = folder / "transforms_test.json";
   return location;
 }
 

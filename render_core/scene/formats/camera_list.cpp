@@ -1,14 +1,20 @@
 #include "render_core/scene/formats/camera_list.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
+#include <optional>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
 
+#include "render_core/base/printable.h"
 #include "render_core/scene/formats/json_field.h"
 
 namespace catgs {
@@ -62,33 +68,97 @@ Pose opengl_pose(const JsonField& matrix, const glm::dvec3& origin) {
   return {matrix.as_place(position, origin), orientation_of(matrix, glm::mat3(rotation))};
 }
 
-/// A positive number of a camera, or of all cameras of the file; 0 where there is none.
-float positive(const JsonField& camera, const JsonField& file, std::string_view key) {
-  for (const JsonField* field : {&camera, &file}) {
-    if (!field->value().is_object()) continue;
-    const auto found = field->find(key);
-    if (found && found->value().is_number()) return std::max(found->number(), 0.0f);
+/// A field of a camera, or of all cameras of the file, by the first of its names that is there.
+std::optional<JsonField> field_of(const JsonField& camera, const JsonField& file,
+                                  std::initializer_list<std::string_view> names) {
+  for (const std::string_view name : names)
+    for (const JsonField* from : {&camera, &file})
+      if (from->value().is_object())
+        if (auto found = from->find(name)) return found;
+  return std::nullopt;
+}
+
+/// Numbers of a camera, or of all cameras of the file; 0 where there is none.
+struct Numbers {
+  const JsonField& camera;
+  const JsonField& file;
+
+  [[nodiscard]] double any(std::initializer_list<std::string_view> names) const {
+    const auto found = field_of(camera, file, names);
+    return found && found->value().is_number() ? found->precise_number() : 0.0;
   }
-  return 0.0f;
+  [[nodiscard]] double positive(std::initializer_list<std::string_view> names) const {
+    return std::max(any(names), 0.0);
+  }
+};
+
+/// Whether no perspective picture shows what such a lens does.
+bool no_pinhole(std::string_view model) {
+  static constexpr std::array parts = {"EQUIRECT", "OMNI",      "VR180", "ORTHO",
+                                       "PANORAMA", "SPHERICAL", "CYLIND"};
+  return std::ranges::any_of(
+      parts, [&](const char* part) { return model.find(part) != std::string_view::npos; });
 }
 
-/// Sets the lens, if all of it is known. Without a principal point it is the middle.
-void set_lens(glm::vec2 size_px, glm::vec2 focal_px, glm::vec2 principal_point_px, Camera& camera) {
-  constexpr float max_side_px = 1 << 20;
-  if (focal_px.y == 0.0f) focal_px.y = focal_px.x;
-  if (!(std::min(size_px.x, size_px.y) >= 1.0f && std::max(size_px.x, size_px.y) <= max_side_px &&
-        focal_px.x > 0.0f))
-    return;
-  camera.size_px = glm::ivec2(size_px);
-  camera.focal_px = focal_px;
-  camera.principal_point_px = glm::vec2(camera.size_px) * 0.5f;
-  for (int axis = 0; axis < 2; ++axis)
-    if (principal_point_px[axis] > 0.0f) camera.principal_point_px[axis] = principal_point_px[axis];
+/// Whether a lens of this model without further numbers is a pinhole.
+bool can_be_straight(std::string_view model) {
+  static constexpr std::array<std::string_view, 10> models = {
+      "",       "PERSPECTIVE", "PINHOLE",     "SIMPLE_PINHOLE", "SIMPLE_RADIAL",
+      "RADIAL", "OPENCV",      "FULL_OPENCV", "BROWN",          "RADTAN"};
+  return std::ranges::find(models, model) != models.end();
 }
 
-float focal_from_angle(float angle_rad, float side_px) {
-  const bool usable = angle_rad > 0.0f && angle_rad < std::numbers::pi_v<float>;
-  return usable ? 0.5f * side_px / std::tan(0.5f * angle_rad) : 0.0f;
+/// The model of a lens in upper case and its numbers; empty for a pinhole.
+std::string distortion_of(const JsonField& camera, const JsonField& file) {
+  std::string text;
+  if (const auto model = field_of(camera, file, {"camera_model", "camera_type"});
+      model && model->value().is_string())
+    text = printable(model->text().substr(0, 40));
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  for (const std::string_view flag : {"is_fisheye", "fisheye", "latlong", "equirectangular"}) {
+    const auto is = field_of(camera, file, {flag});
+    if (is && is->value() == true && can_be_straight(text))
+      text = flag.ends_with("fisheye") ? "FISHEYE" : "EQUIRECTANGULAR";
+  }
+  bool straight = can_be_straight(text);
+  for (const char* name :
+       {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "p3", "p4", "s1", "s2", "s3", "s4",
+        "ftheta_p0", "ftheta_p1", "ftheta_p2", "ftheta_p3", "ftheta_p4"}) {
+    const double number = Numbers{camera, file}.any({name});
+    if (number == 0.0) continue;
+    text += fmt::format("{}{} {:g}", text.empty() ? "" : " ", name, number);
+    straight = false;
+  }
+  return straight ? std::string() : text;
+}
+
+/// The lens, as far as the file tells it. Focal lengths come before angles.
+Lens read_lens(const JsonField& camera, const JsonField& file) {
+  constexpr double max_side_px = 1 << 20, least_focal_px = 1e-6;
+  constexpr double degree = std::numbers::pi / 180.0;
+  const Numbers of{camera, file};
+  const glm::dvec2 size_px{of.positive({"w", "width", "render_width"}),
+                           of.positive({"h", "height", "render_height"})};
+  const glm::dvec2 focal_px{of.positive({"fl_x", "fx"}), of.positive({"fl_y", "fy"})};
+  const glm::dvec2 centre_px{of.positive({"cx"}), of.positive({"cy"})};
+  glm::dvec2 angle_rad{of.positive({"camera_angle_x"}), of.positive({"camera_angle_y"})};
+  if (angle_rad.x == 0.0) angle_rad.x = degree * of.positive({"x_fov"});
+  if (angle_rad.y == 0.0) angle_rad.y = degree * of.positive({"y_fov", "fov", "default_fov"});
+  Lens lens;
+  lens.distortion = distortion_of(camera, file);
+  if (no_pinhole(lens.distortion)) return lens;
+  const bool sized =
+      std::min(size_px.x, size_px.y) >= 1.0 && std::max(size_px.x, size_px.y) <= max_side_px;
+  if (sized) lens.size_px = glm::ivec2(size_px);
+  for (int axis = 0; axis < 2; ++axis) {
+    const double side = lens.size_px[axis];
+    if (sized && focal_px[axis] > least_focal_px)
+      lens.half_tan[axis] = 0.5 * side / focal_px[axis];
+    else if (angle_rad[axis] > 0.0 && angle_rad[axis] < std::numbers::pi)
+      lens.half_tan[axis] = std::tan(0.5 * angle_rad[axis]);
+    if (sized && centre_px[axis] > 0.0) lens.centre[axis] = centre_px[axis] / side;
+  }
+  return lens;
 }
 
 std::string name_of(const JsonField& camera, std::string_view key) {
@@ -103,13 +173,12 @@ CameraList read_array(const JsonField& all, const glm::dvec3& origin) {
     ListedCamera& listed = list.cameras.emplace_back();
     if (const auto matrix = item.find("transform")) {
       listed.name = name_of(item, "file_path");
-      listed.camera.world_from_camera = opengl_pose(*matrix, origin);
-      continue;
+      listed.world_from_camera = opengl_pose(*matrix, origin);
+    } else {
+      listed.name = name_of(item, "img_name");
+      listed.world_from_camera = training_pose(item, origin);
     }
-    const auto number = [&](std::string_view key) { return positive(item, item, key); };
-    listed.name = name_of(item, "img_name");
-    listed.camera.world_from_camera = training_pose(item, origin);
-    set_lens({number("width"), number("height")}, {number("fx"), number("fy")}, {}, listed.camera);
+    listed.lens = read_lens(item, item);
   }
   // A training writes its test views first. The names of a video's frames are in order of time.
   if (std::ranges::none_of(list.cameras, &std::string::empty, &ListedCamera::name))
@@ -122,15 +191,9 @@ CameraList read_transforms(const JsonField& file, const glm::dvec3& origin) {
   const JsonField frames = file.at("frames");
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const JsonField frame = frames[i];
-    const auto number = [&](std::string_view key) { return positive(frame, file, key); };
-    ListedCamera& listed = list.cameras.emplace_back();
-    listed.name = name_of(frame, "file_path");
-    listed.camera.world_from_camera = opengl_pose(frame.at("transform_matrix"), origin);
-    const glm::vec2 size_px{number("w"), number("h")};
-    glm::vec2 focal_px{number("fl_x"), number("fl_y")};
-    if (focal_px.x == 0.0f) focal_px.x = focal_from_angle(number("camera_angle_x"), size_px.x);
-    if (focal_px.y == 0.0f) focal_px.y = focal_from_angle(number("camera_angle_y"), size_px.y);
-    set_lens(size_px, focal_px, {number("cx"), number("cy")}, listed.camera);
+    list.cameras.push_back({name_of(frame, "file_path"),
+                            opengl_pose(frame.at("transform_matrix"), origin),
+                            read_lens(frame, file)});
   }
   return list;
 }
@@ -138,22 +201,18 @@ CameraList read_transforms(const JsonField& file, const glm::dvec3& origin) {
 CameraList read_path(const JsonField& file, const glm::dvec3& origin) {
   if (const auto type = file.find("camera_type"); type && type->text() != "perspective")
     type->fail("is not a perspective camera", "this renderer draws perspective pictures only");
-  const auto number = [&](std::string_view key) { return positive(file, file, key); };
-  const glm::vec2 size_px{number("render_width"), number("render_height")};
   CameraList list;
   const JsonField cameras = file.at("camera_path");
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const JsonField item = cameras[i];
-    ListedCamera& listed = list.cameras.emplace_back();
-    listed.camera.world_from_camera = opengl_pose(item.at("camera_to_world"), origin);
-    const float fov_y_rad = positive(item, item, "fov") * std::numbers::pi_v<float> / 180.0f;
-    set_lens(size_px, glm::vec2(focal_from_angle(fov_y_rad, size_px.y)), {}, listed.camera);
+    list.cameras.push_back(
+        {"", opengl_pose(item.at("camera_to_world"), origin), read_lens(item, file)});
   }
-  const auto count = static_cast<float>(list.cameras.size());
-  if (number("fps") > 0.0f) {
-    list.rate_hz = number("fps");
-  } else if (number("seconds") > 0.0f) {
-    list.rate_hz = count / number("seconds");
+  const Numbers of{file, file};
+  if (const double rate_hz = of.positive({"fps"}); rate_hz > 0.0) {
+    list.rate_hz = rate_hz;
+  } else if (const double seconds = of.positive({"seconds"}); seconds > 0.0) {
+    list.rate_hz = static_cast<double>(list.cameras.size()) / seconds;
   }
   return list;
 }

@@ -4,15 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "render_core/math/camera.h"
+#include "render_core/math/lens.h"
 #include "render_core/scene/formats/byte_source.h"
 
 namespace catgs {
 
-/// The camera of a photograph or of a keyframe. Its axes are ours; the near plane is the default.
+/// The camera of a photograph or of a keyframe. Its axes are ours.
 struct ListedCamera {
   std::string name;  // of its picture, as the file writes it; may be empty
-  Camera camera;     // size_px is 0 where the file does not describe the whole lens
+  Pose world_from_camera;
+  Lens lens;
 };
 
 struct CameraList {
@@ -23,7 +24,7 @@ struct CameraList {
 /// Reads cameras that programs of the field write as JSON. The content tells the form:
 ///
 ///   cameras.json      of a 3DGS training, in the order of the pictures' names
-///   transforms.json   of nerfstudio, instant-ngp and Blender data sets
+///   transforms.json   of nerfstudio, instant-ngp and Blender data sets; also transforms_test.json
 ///   camera_path.json  of nerfstudio's viewer; perspective cameras only
 ///   transforms_*.json that `ns-export cameras` writes
 ///

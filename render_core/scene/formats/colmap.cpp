@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string_view>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/formats/byte_source.h"
@@ -20,7 +20,7 @@ namespace {
 constexpr std::uint64_t max_file_bytes = std::uint64_t{8} << 30;
 constexpr std::size_t max_name_bytes = 4096;
 constexpr int max_side_px = 1 << 20;
-using Cameras = std::map<std::uint32_t, Camera>;
+using Lenses = std::map<std::uint32_t, Lens>;
 
 constexpr std::size_t max_parameters = 16;
 
@@ -64,31 +64,33 @@ const Model& model_of(const std::string& file, const std::string& where, const K
   return *model;
 }
 
-Camera make_camera_of(const std::string& file, const std::string& where, std::uint64_t width,
-                      std::uint64_t height, const Model& model,
-                      std::span<const double> parameters) {
-  const bool one_focal = model.focal_lengths == 1;
-  Camera camera;
-  camera.size_px = {static_cast<int>(std::min<std::uint64_t>(width, max_side_px + 1)),
-                    static_cast<int>(std::min<std::uint64_t>(height, max_side_px + 1))};
-  camera.focal_px = {parameters[0], parameters[one_focal ? 0 : 1]};
-  camera.principal_point_px = {parameters[one_focal ? 1 : 2], parameters[one_focal ? 2 : 3]};
+Lens make_lens(const std::string& file, const std::string& where, std::uint64_t width,
+               std::uint64_t height, const Model& model, std::span<const double> parameters) {
   const bool sized = width > 0 && height > 0 && width <= max_side_px && height <= max_side_px;
-  const bool positive = camera.focal_px.x > 0.0f && camera.focal_px.y > 0.0f;
-  if (!sized || !positive || !std::ranges::all_of(parameters, [](double p) {
-        return std::isfinite(static_cast<float>(p));
-      })) {
+  const std::span<const double> focal = parameters.first(model.focal_lengths);
+  const auto rest = parameters.subspan(model.focal_lengths);
+  if (!sized ||
+      !std::ranges::all_of(focal, [](double f) { return static_cast<float>(f) > 0.0f; }) ||
+      !std::ranges::all_of(parameters,
+                           [](double p) { return std::isfinite(static_cast<float>(p)); })) {
     throw InputError(file, where, "has no usable size, focal length or principal point");
   }
-  return camera;
+  const glm::dvec2 size_px(width, height);
+  Lens lens{glm::ivec2(size_px), 0.5 * size_px / glm::dvec2(focal.front(), focal.back()),
+            glm::dvec2(rest[0], rest[1]) / size_px, ""};
+  // Those that COLMAP numbers up to FULL_OPENCV are pinholes where their numbers are 0.
+  const auto bends = rest.subspan(2);
+  if (model.id == 5 || model.id > 6 || std::ranges::any_of(bends, [](double k) { return k != 0; }))
+    lens.distortion = fmt::format("{} {:g}", model.name, fmt::join(bends, ", "));
+  return lens;
 }
 
 /// COLMAP stores camera_from_world: rotation w, x, y, z and translation.
 ListedCamera make_image(const std::string& file, const std::string& where, std::string name,
-                        const std::array<double, 7>& pose, const Cameras& cameras,
+                        const std::array<double, 7>& pose, const Lenses& lenses,
                         std::uint32_t camera_id, const glm::dvec3& origin) {
-  const auto camera = cameras.find(camera_id);
-  if (camera == cameras.end()) {
+  const auto lens = lenses.find(camera_id);
+  if (lens == lenses.end()) {
     throw InputError(file, where, fmt::format("there is no camera {}", camera_id));
   }
   const glm::dquat rotation(pose[0], pose[1], pose[2], pose[3]);
@@ -99,11 +101,10 @@ ListedCamera make_image(const std::string& file, const std::string& where, std::
     throw InputError(file, where, "its pose is not a rotation and a translation");
   }
   const glm::dquat world_from_camera = glm::conjugate(rotation / norm);
-  ListedCamera image{std::move(name), camera->second};
-  image.camera.world_from_camera = {
-      glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6])) - origin),
-      glm::quat(world_from_camera)};
-  return image;
+  return {std::move(name),
+          {glm::vec3(-(world_from_camera * glm::dvec3(pose[4], pose[5], pose[6])) - origin),
+           glm::quat(world_from_camera)},
+          lens->second};
 }
 
 /// Reads values one behind the other; the source throws where the file ends.
@@ -141,9 +142,9 @@ class BinaryReader {
   std::uint64_t offset_ = 0;
 };
 
-Cameras read_binary_cameras(const std::filesystem::path& path, Distortion distortion) {
+Lenses read_binary_cameras(const std::filesystem::path& path, Distortion distortion) {
   BinaryReader file(path);
-  Cameras cameras;
+  Lenses cameras;
   const auto count = file.next<std::uint64_t>();
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string where = file.where();
@@ -154,13 +155,13 @@ Cameras read_binary_cameras(const std::filesystem::path& path, Distortion distor
     std::array<double, max_parameters> parameters{};
     const auto used = std::span(parameters).first(model.parameters);
     for (double& parameter : used) parameter = file.next<double>();
-    cameras[id] = make_camera_of(file.name(), where, width, height, model, used);
+    cameras[id] = make_lens(file.name(), where, width, height, model, used);
   }
   return cameras;
 }
 
 std::vector<ListedCamera> read_binary_images(const std::filesystem::path& path,
-                                             const Cameras& cameras, const glm::dvec3& origin) {
+                                             const Lenses& cameras, const glm::dvec3& origin) {
   constexpr std::uint64_t point_bytes = 24;  // x, y and the number of a 3D point
   BinaryReader file(path);
   std::vector<ListedCamera> images;
@@ -198,8 +199,8 @@ std::vector<Line> read_lines(const std::filesystem::path& path) {
 
 std::string where_of(const Line& line) { return fmt::format("line {}", line.number); }
 
-Cameras read_text_cameras(const std::filesystem::path& path, Distortion distortion) {
-  Cameras cameras;
+Lenses read_text_cameras(const std::filesystem::path& path, Distortion distortion) {
+  Lenses cameras;
   for (const Line& line : read_lines(path)) {
     if (line.text.empty()) continue;
     std::istringstream fields(line.text);
@@ -219,7 +220,7 @@ Cameras read_text_cameras(const std::filesystem::path& path, Distortion distorti
     const auto used = std::span(parameters).first(model.parameters);
     for (double& parameter : used) fields >> parameter;
     need();
-    cameras[id] = make_camera_of(path.string(), where_of(line), width, height, model, used);
+    cameras[id] = make_lens(path.string(), where_of(line), width, height, model, used);
   }
   return cameras;
 }
@@ -235,8 +236,8 @@ bool lists_points(std::string_view text) {
   return words % 3 == 0;
 }
 
-std::vector<ListedCamera> read_text_images(const std::filesystem::path& path,
-                                           const Cameras& cameras, const glm::dvec3& origin) {
+std::vector<ListedCamera> read_text_images(const std::filesystem::path& path, const Lenses& cameras,
+                                           const glm::dvec3& origin) {
   const std::vector<Line> lines = read_lines(path);
   std::vector<ListedCamera> images;
   // A line of points, which may be none, is behind each image; further empty lines may be anywhere.

@@ -42,16 +42,6 @@ std::filesystem::path find_photo(const std::filesystem::path& folder, const std:
                    "photographs are PNG or JPEG, of the names that COLMAP knows");
 }
 
-/// The camera for a picture that was scaled after COLMAP had seen it.
-Camera scaled_to(const Camera& camera, glm::ivec2 size_px) {
-  Camera scaled = camera;
-  const glm::vec2 factor = glm::vec2(size_px) / glm::vec2(camera.size_px);
-  scaled.size_px = size_px;
-  scaled.focal_px *= factor;
-  scaled.principal_point_px *= factor;
-  return scaled;
-}
-
 /// Renders a camera path through the poses of the photographs, and compares it with them.
 class PhotoJudge {
  public:
@@ -74,7 +64,7 @@ class PhotoJudge {
     Trajectory samples, poses;
     for (std::size_t k = 0; k < images_.size(); ++k) {
       const double seconds = static_cast<double>(k) / options.image_rate_hz;
-      samples.push_back({std::llround(1e6 * seconds), images_[k].camera.world_from_camera});
+      samples.push_back({std::llround(1e6 * seconds), images_[k].world_from_camera});
       for (int step = k == 0 ? steps : 1; step <= steps; ++step) {
         const std::int64_t before_us = k == 0 ? 0 : samples[k - 1].time_us;
         const std::int64_t time_us = before_us + (samples[k].time_us - before_us) * step / steps;
@@ -95,13 +85,13 @@ class PhotoJudge {
       Image photo;
       if (judged) {
         photo = read_picture(find_photo(folder_, images_[k].name));
-        scale = glm::vec2(photo.size_px) / glm::vec2(images_[k].camera.size_px);
+        scale = glm::vec2(photo.size_px) / glm::vec2(images_[k].lens.size_px);
       }
       // A photograph between test views only moves the camera. Its size need not be read.
       const glm::ivec2 size_px =
           judged ? photo.size_px
-                 : glm::ivec2(glm::round(scale * glm::vec2(images_[k].camera.size_px)));
-      const Camera camera = scaled_to(images_[k].camera, glm::max(size_px, 1));
+                 : glm::ivec2(glm::round(scale * glm::vec2(images_[k].lens.size_px)));
+      const Camera camera = make_camera(images_[k].lens, glm::max(size_px, 1));
       FrameView frame;
       for (int step = k == 0 ? steps : 1; step <= steps; ++step) {
         FrameRequest request = feed.next();
@@ -146,7 +136,7 @@ class PhotoJudge {
     for (Row& row : rows_) {
       if (&row == &sub_) continue;
       FrameRequest request;  // without a forecast the paper's frame is a key frame
-      request.camera = with_pose(camera, camera.world_from_camera);
+      request.camera = with_pose(camera, images_[photo_index].world_from_camera);
       FrameView frame;
       render_or_throw(*row.view, request, frame);
       row.picture = copy_image(frame);

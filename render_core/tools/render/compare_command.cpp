@@ -18,6 +18,7 @@
 #include "render_core/tools/commands.h"
 #include "render_core/tools/json_report.h"
 #include "render_core/tools/picture.h"
+#include "render_core/tools/picture_camera.h"
 
 namespace catgs {
 namespace {
@@ -28,14 +29,52 @@ struct CompareOptions {
   std::optional<double> required_psnr_db;
 };
 
-void print_json(const ImageQuality& quality) {
+/// The picture of a comparison whose cameras are the farthest apart, if any are.
+class CameraCheck {
+ public:
+  void add(const std::string& name, const std::filesystem::path& a,
+           const std::filesystem::path& b) {
+    const auto camera = camera_of_picture(a), other = camera_of_picture(b);
+    if (!camera || !other) return;
+    const CameraDifference difference(*camera, *other);
+    if (!difference.matters()) return;
+    ++count_;
+    if (!worst_ || difference.units > worst_->units) worst_.emplace(difference), name_ = name;
+  }
+  /// Says on stderr that a comparison does not tell what it seems to.
+  void warn() const {
+    if (!worst_) return;
+    fmt::print(stderr,
+               "note: {} pictures were drawn by other cameras than their partners: {} by {:.3g} "
+               "units, {:.3g} degrees, {:.3g} px of focal length or centre. Draw both along one "
+               "path: trace script SCENE --script orbit --out path.tum, then frames --trace "
+               "path.tum\n",
+               count_, printable(name_), worst_->units, worst_->degrees, worst_->pixels);
+  }
+  [[nodiscard]] nlohmann::ordered_json json() const {
+    if (!worst_) return nullptr;
+    return {{"pictures", count_},
+            {"worst", name_},
+            {"units", worst_->units},
+            {"degrees", worst_->degrees},
+            {"focal_or_centre_px", worst_->pixels}};
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::string name_;
+  std::optional<CameraDifference> worst_;
+};
+
+void print_json(const ImageQuality& quality, const CameraCheck& cameras) {
   // JSON has no infinity: null stands for the PSNR of identical pictures.
   const nlohmann::ordered_json json = {
       {"psnr_db", quality.psnr()},
       {"ssim", quality.ssim},
       {"max_error", quality.max_error},
       {"worst_block_psnr_db", quality.worst_block_psnr()},
-      {"block_0_1_percent_psnr_db", quality.block_0_1_percent_psnr()}};
+      {"block_0_1_percent_psnr_db", quality.block_0_1_percent_psnr()},
+      {"cameras_differ", cameras.json()}};
   write_json("-", json);
 }
 
@@ -80,13 +119,15 @@ struct NamedQuality {
 };
 
 /// Each picture of `a` with that of the same name in `b`; then the means.
-std::vector<NamedQuality> compare_folders(const CompareOptions& options, std::size_t& left_out) {
+std::vector<NamedQuality> compare_folders(const CompareOptions& options, std::size_t& left_out,
+                                          CameraCheck& cameras) {
   const auto ours = pictures_in(options.a), theirs = pictures_in(options.b);
   std::vector<NamedQuality> all;
   for (const auto& [name, path] : ours) {
     all.push_back({name});
     if (!theirs.contains(name))
       throw InputError(options.b, name, "is missing", fmt::format("{} has it", options.a));
+    cameras.add(name, path, theirs.at(name));
   }
   left_out = theirs.size() - ours.size();
   ThreadPool pool;
@@ -107,7 +148,9 @@ std::vector<NamedQuality> compare_folders(const CompareOptions& options, std::si
 /// Returns the mean PSNR.
 double report_folders(const CompareOptions& options) {
   std::size_t left_out = 0;
-  const std::vector<NamedQuality> all = compare_folders(options, left_out);
+  CameraCheck cameras;
+  const std::vector<NamedQuality> all = compare_folders(options, left_out, cameras);
+  cameras.warn();
   if (options.json) {
     nlohmann::ordered_json json;
     for (const NamedQuality& one : all) {
@@ -116,6 +159,7 @@ double report_folders(const CompareOptions& options) {
       place = {{"psnr_db", one.psnr}, {"ssim", one.ssim}};
     }
     json["left_out"] = left_out;
+    json["cameras_differ"] = cameras.json();
     write_json("-", json);
     return all.back().psnr;
   }
@@ -133,8 +177,11 @@ double report_folders(const CompareOptions& options) {
 /// Returns the PSNR.
 double report_pair(const CompareOptions& options) {
   const ImageQuality quality = compare_pair(options.a, options.b);
+  CameraCheck cameras;
+  cameras.add(options.a, options.a, options.b);
+  cameras.warn();
   if (options.json) {
-    print_json(quality);
+    print_json(quality, cameras);
   } else {
     print_table(quality);
   }
@@ -159,7 +206,9 @@ void compare(const CompareOptions& options) {
 void add_compare_command(CLI::App& app) {
   auto options = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand(
-      "compare", "Compares two pictures (PNG, JPEG), or those of two folders by name");
+      "compare",
+      "Compares two pictures (PNG, JPEG), or those of two folders by name. Notes where frames has "
+      "drawn them with different cameras");
   command->add_option("a", options->a, "Picture or folder")->required();
   command->add_option("b", options->b, "Picture or folder to compare with")->required();
   command->add_flag("--json", options->json, "Print JSON");

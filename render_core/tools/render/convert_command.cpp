@@ -1,9 +1,11 @@
 // catgs-render convert: reads a scene, edits it, and writes it in another format.
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
@@ -69,38 +71,77 @@ void copy_media(const std::filesystem::path& from_sidecar,
              from.string(), there);
 }
 
-/// Estimated hints can be estimated again. Others would be lost with the files that they came from.
-/// The sidecar counts from the 0 of the file that is written.
+/// Whether places have other coordinates in the output than in the input.
+bool moves(const Conversion& conversion, const EditAboutOrigin& done) {
+  return conversion.edit.placement.moves() ||
+         (done.origin != glm::dvec3(0.0) && !keeps_origin(conversion.options.out));
+}
+
+/// Whether the output's sidecar would tell the view of the input, too.
+bool shares_sidecar(const Conversion& conversion) {
+  std::error_code error;
+  const std::filesystem::path to = sidecar_of(conversion.options.out);
+  return std::filesystem::weakly_canonical(to, error) ==
+         std::filesystem::weakly_canonical(conversion.in.hints.sidecar, error);
+}
+
+/// The hints of the output. They count from the 0 of the file that is written.
+SceneHints hints_of_output(const SceneHints& hints, const Conversion& conversion,
+                           const EditAboutOrigin& done) {
+  const Placement& moved = done.edit.placement;
+  SceneHints written = moved.moves() ? placed(hints, moved) : hints;
+  written.origin = keeps_origin(conversion.options.out) ? done.origin : glm::dvec3(0.0);
+  return written;
+}
+
+/// Refuses a sidecar that is there and tells another view than that of the moved scene.
+void check_sidecar_fits(const SceneHints& hints, const Conversion& conversion,
+                        const EditAboutOrigin& done) {
+  const auto sidecar = sidecar_of(conversion.options.out);
+  std::error_code error;
+  if (!moves(conversion, done) || !std::filesystem::exists(sidecar, error)) return;
+  const SceneHints moved = hints_of_output(hints, conversion, done);
+  SceneHints there = moved;
+  use_sidecar(read_sidecar(FileSource(sidecar), moved.origin), sidecar.string(), there);
+  const float tolerance = 1e-5f * (1.0f + glm::distance(moved.limits.min, moved.limits.max));
+  const auto same = [&](const glm::vec3& a, const glm::vec3& b) {
+    return glm::distance(a, b) <= tolerance;
+  };
+  const glm::quat &was = moved.start_pose.orientation, &is = there.start_pose.orientation;
+  if (same(moved.start_pose.position, there.start_pose.position) &&
+      std::abs(glm::dot(was, is)) > 1.0f - 1e-5f && same(moved.focus, there.focus) &&
+      same(moved.limits.min, there.limits.min) && same(moved.limits.max, there.limits.max) &&
+      glm::distance(moved.up, there.up) < 1e-4f &&
+      std::abs(moved.near_z - there.near_z) <= tolerance)
+    return;
+  throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
+                   "give the output another name, or move the file away");
+}
+
+/// The output begins where the input does. Its own estimate would differ a little, so that pictures
+/// of both could not be compared. A view that has moved is not the input's.
 void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
                         const EditAboutOrigin& done) {
-  Placement placement = conversion.edit.placement;
-  const bool kept = keeps_origin(conversion.options.out);
-  if (!kept) placement.offset -= done.origin;
-  if (hints.source.empty() || hints.source == "estimated") return;
   const auto sidecar = sidecar_of(conversion.options.out);
-  if (std::error_code error; std::filesystem::exists(sidecar, error)) {
-    fmt::print(stderr, "note: {} exists and was left as it is\n", sidecar.string());
+  std::error_code error;
+  const bool there = std::filesystem::exists(sidecar, error);
+  if (there || (moves(conversion, done) && shares_sidecar(conversion))) {
+    fmt::print(stderr, "note: {} {}\n", printable(sidecar.string()),
+               there ? "exists and was left as it is"
+                     : "was not written, since it would be the input's, too");
     return;
   }
   nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
-  const glm::dvec3 origin = kept ? done.origin : glm::dvec3(0.0);
-  if (placement.moves()) place_tours(tours, placement, origin);
-  const Placement& moved = done.edit.placement;
-  SceneHints written = moved.moves() ? placed(hints, moved) : hints;
-  written.origin = origin;
+  const SceneHints written = hints_of_output(hints, conversion, done);
+  Placement placement = conversion.edit.placement;
+  if (!keeps_origin(conversion.options.out)) placement.offset -= done.origin;
+  if (placement.moves()) place_tours(tours, placement, written.origin);
   write_sidecar(written, sidecar, &tours);
-  fmt::print("{}: first view, from {}\n", sidecar.string(), hints.source);
+  fmt::print("{}: first view, {}{}\n", sidecar.string(), hints.source == "estimated" ? "" : "from ",
+             hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
   if (!tours.is_null()) copy_media(conversion.in.hints.sidecar, sidecar);
-}
-
-/// A sidecar that is there would be that of other coordinates.
-void refuse_sidecar(const std::string& out) {
-  const auto sidecar = sidecar_of(out);
-  if (std::error_code error; std::filesystem::exists(sidecar, error))
-    throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
-                     "give the output another name, or move the file away");
 }
 
 /// Before the scene is loaded, which may take minutes.
@@ -112,7 +153,6 @@ Conversion check(const ConvertOptions& options) {
     if (std::filesystem::equivalent(path, options.out, error))
       throw InputError(options.out, "", "is the scene that is read",
                        "give the output another name");
-  if (conversion.edit.placement.moves()) refuse_sidecar(options.out);
   return conversion;
 }
 
@@ -158,6 +198,7 @@ bool convert_in_parts(const Conversion& conversion, bool quiet) {
   if (!scene) return false;
   EditCounts counts;
   const EditAboutOrigin about = about_origin(conversion.edit, scene->hints.origin);
+  check_sidecar_fits(scene->hints, conversion, about);
   write_tree(edited(scene->parts, about, pool, counts), options.tree, options.out, *pool, quiet);
   print_counts(counts);
   print_notes(scene->notes);
@@ -189,11 +230,9 @@ EditCounts edit_whole(GaussianCloud& cloud, const SceneEdit& edit, int threads, 
 void convert(const ConvertOptions& options, bool quiet) {
   const Conversion conversion = check(options);
   if (convert_in_parts(conversion, quiet)) return;
-  constexpr bool first_view = false;  // would be estimated anew from the file that is written
-  Scene scene = load_scene(conversion.in, options.in, options.threads, quiet, first_view);
+  Scene scene = load_scene(conversion.in, options.in, options.threads, quiet);
   const EditAboutOrigin about = about_origin(conversion.edit, scene.hints.origin);
-  const bool moves = about.origin != glm::dvec3(0.0) && !keeps_origin(options.out);
-  if (moves) refuse_sidecar(options.out);
+  check_sidecar_fits(scene.hints, conversion, about);
   const EditCounts counts = edit_whole(scene.cloud, about.edit, options.threads, quiet);
   print_notes(losses_of(scene.cloud, options.out));
   save(scene, about.origin, options, quiet);

@@ -1,14 +1,20 @@
 #include "render_core/tools/render/frame_sink.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <set>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
+#include "render_core/base/printable.h"
 #include "render_core/image/png.h"
+#include "render_core/tools/picture_camera.h"
 #include "render_core/video/video_file.h"
 
 namespace catgs {
@@ -32,8 +38,8 @@ void write_npy(const std::filesystem::path& path, glm::ivec2 size_px,
 }
 
 void write_picture(const std::filesystem::path& path, const FrameView& frame,
-                   const FrameLayers& layers) {
-  write_png(path, copy_image(frame), layers.alpha);
+                   const FrameLayers& layers, const Camera& camera) {
+  write_png(path, copy_image(frame), layers.alpha, {}, {camera_key, camera_text(camera)});
   if (!layers.depth.empty())
     write_npy(std::filesystem::path(path).replace_extension(".npy"), frame.size_px, layers.depth);
 }
@@ -43,8 +49,8 @@ class PngSink final : public FrameSink {
   explicit PngSink(std::filesystem::path path) : path_(std::move(path)) {}
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
-  void write(const FrameView& frame, const FrameLayers& layers) override {
-    write_picture(path_, frame, layers);
+  void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
+    write_picture(path_, frame, layers, camera);
   }
   void finish() override {}
 
@@ -55,21 +61,24 @@ class PngSink final : public FrameSink {
 class PngFolderSink final : public FrameSink {
  public:
   explicit PngFolderSink(const FrameSinkSettings& settings)
-      : folder_(settings.path), number_(settings.first_frame) {
+      : folder_(settings.path), number_(settings.first_frame), names_(settings.names) {
     std::error_code error;
     std::filesystem::create_directories(folder_, error);
     if (error) throw InputError(folder_.string(), "", error.message(), "a folder is needed");
   }
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
-  void write(const FrameView& frame, const FrameLayers& layers) override {
-    write_picture(folder_ / fmt::format("frame_{:06}.png", number_++), frame, layers);
+  void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
+    const std::string name =
+        names_.empty() ? fmt::format("frame_{:06}", number_++) : names_.at(written_++);
+    write_picture(folder_ / (name + ".png"), frame, layers, camera);
   }
   void finish() override {}
 
  private:
   std::filesystem::path folder_;
-  std::size_t number_;
+  std::size_t number_, written_ = 0;
+  std::vector<std::string> names_;
 };
 
 /// Uncompressed video. Its header has no field for the colour matrix; readers usually infer it from
@@ -85,7 +94,7 @@ class Y4mSink final : public FrameSink {
   }
 
   PixelFormat format() const override { return PixelFormat::i420; }
-  void write(const FrameView& frame, const FrameLayers&) override {
+  void write(const FrameView& frame, const FrameLayers&, const Camera&) override {
     file_ << "FRAME\n";
     for (int plane = 0; plane < 3; ++plane) {
       const glm::ivec2 size = plane == 0 ? frame.size_px : frame.size_px / 2;
@@ -117,7 +126,9 @@ class Mp4Sink final : public FrameSink {
       : file_(make_mp4_file({settings.path.string(), settings.size_px, settings.fps})) {}
 
   PixelFormat format() const override { return PixelFormat::i420; }
-  void write(const FrameView& frame, const FrameLayers&) override { file_->write(frame); }
+  void write(const FrameView& frame, const FrameLayers&, const Camera&) override {
+    file_->write(frame);
+  }
   void finish() override { file_->finish(); }
 
  private:
@@ -125,6 +136,29 @@ class Mp4Sink final : public FrameSink {
 };
 
 }  // namespace
+
+std::vector<std::string> picture_names(const std::vector<std::string>& of_path) {
+  const auto without_extension = [](const std::filesystem::path& file) {
+    const std::string extension = file.extension().string();  // that of "frame.0001" is a number
+    const bool is_word =
+        std::ranges::any_of(extension, [](unsigned char c) { return std::isalpha(c) != 0; });
+    return is_word ? std::filesystem::path(file).replace_extension() : file;
+  };
+  for (const bool whole : {false, true}) {
+    std::vector<std::string> names;
+    for (const std::string& name : of_path) {
+      const auto file = without_extension(std::filesystem::path(name).lexically_normal());
+      names.push_back(whole ? file.string() : file.filename().string());
+      std::ranges::replace(names.back(), '/', '_');
+    }
+    const bool usable = std::ranges::all_of(names, [](const std::string& name) {
+      return !name.empty() && name.size() <= 200 && name.front() != '.' && printable(name) == name;
+    });
+    const std::set<std::string_view> different(names.begin(), names.end());
+    if (usable && different.size() == names.size()) return names;
+  }
+  return {};
+}
 
 bool is_video(const std::filesystem::path& path) {
   return path.extension() == ".y4m" || path.extension() == ".mp4";

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "render_core/frame/renderer.h"
 #include "render_core/tools/render/frame_layers.h"
@@ -18,7 +20,8 @@ class FrameSink {
 
   /// Format of the frames that write() takes, always in host memory.
   [[nodiscard]] virtual PixelFormat format() const = 0;
-  virtual void write(const FrameView& frame, const FrameLayers& layers) = 0;
+  /// `camera`: that drew the frame, which pictures tell.
+  virtual void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) = 0;
   /// Completes the file. Call it after the last frame; without it the file is unusable.
   virtual void finish() = 0;
 };
@@ -26,16 +29,22 @@ class FrameSink {
 struct FrameSinkSettings {
   std::filesystem::path path;
   glm::ivec2 size_px{0};
-  double fps = 60.0;            // of a video
-  std::size_t first_frame = 0;  // number of the first picture in a folder
-  bool layers = false;          // frames come with layers, which only pictures can hold
+  double fps = 60.0;                 // of a video
+  std::size_t first_frame = 0;       // number of the first picture in a folder
+  std::vector<std::string> names{};  // of the pictures in a folder, without extension; or numbers
+  bool layers = false;               // frames come with layers, which only pictures can hold
 };
+
+/// Names of files for the pictures of a path, as compare takes them: without folders and extension,
+/// or with underscores for slashes where those would meet. Empty where they cannot be told apart.
+std::vector<std::string> picture_names(const std::vector<std::string>& of_path);
 
 bool is_video(const std::filesystem::path& path);
 
 /// Chooses by the extension of the path: one .png, a .y4m or .mp4 video (both BT.709 limited range
 /// 4:2:0), else a folder of frame_000000.png …, created if missing. A picture holds its frame's
-/// alpha; its depth goes into a NumPy file beside it: float32, height x width. Throws InputError.
+/// camera (picture_camera.h) and alpha; its depth goes into a NumPy file beside it: float32, height
+/// x width. Throws InputError.
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings);
 
 }  // namespace catgs

@@ -1,5 +1,6 @@
 // catgs-render frames: a camera path as pictures or video.
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -11,6 +12,7 @@
 #include "render_core/image/panorama.h"
 #include "render_core/image/png.h"
 #include "render_core/metrics/image_quality.h"
+#include "render_core/scene/files/locate_scene.h"
 #include "render_core/tools/commands.h"
 #include "render_core/tools/frame_feed.h"
 #include "render_core/tools/progress.h"
@@ -55,23 +57,29 @@ RenderSetup prepare_frames(const FramesOptions& options, bool quiet) {
   RenderOptions render = options.render;
   const glm::vec3 background = parse_colour("--background", options.background);
   if (!render.fps && !render.script.empty()) render.fps = default_fps;
-  if (options.panorama && !render.lens.size_given) {
-    render.lens.size = panorama_size;
+  if (options.panorama) {
+    render.lens.fov_y_deg = 90.0f;  // its sides have a lens of their own
+    if (!render.lens.size_given) render.lens.size = panorama_size;
     render.lens.size_given = true;
+  }
+  if (is_video(options.out)) render.most_fps = default_fps;
+  std::error_code error;
+  if (render.trace.empty() && render.script.empty() &&
+      std::filesystem::exists(render.scene.path, error)) {
+    const auto test_views = locate_scene(render.scene.path).hints.test_views;
+    if (std::filesystem::exists(test_views, error)) render.trace = test_views.string();
   }
   RenderSetup setup = prepare(render, quiet);
   setup.background = background;
-  if (!render.fps && is_video(options.out) && setup.fps > default_fps) {
-    render.fps = default_fps;
-    set_path(setup, render);
-  }
   // One picture shows all that a camera at rest sees, unless a length was asked for.
-  if (render.frames.empty() && !render.duration_s && is_still(setup.poses)) setup.poses.resize(1);
+  const bool one_lens = setup.names.empty() && setup.lenses.empty();
+  if (one_lens && render.frames.empty() && !render.duration_s && is_still(setup.poses))
+    setup.poses.resize(1);
   return setup;
 }
 
-/// The panorama from where `request` looks, as a frame that `image` holds.
-FrameView draw_panorama(const RenderSetup& setup, FrameRequest request, View& view,
+/// The panorama from where `request` looks, which is levelled, as a frame that `image` holds.
+FrameView draw_panorama(const RenderSetup& setup, FrameRequest& request, View& view,
                         HostImage& image) {
   Pose& pose = request.camera.world_from_camera;
   pose = levelled(pose, setup.scene.hints.up);
@@ -103,6 +111,7 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
                                .size_px = setup.camera.size_px,
                                .fps = setup.fps,
                                .first_frame = setup.first,
+                               .names = picture_names(setup.names),
                                .layers = options.alpha || options.depth});
   if (options.out.ends_with(".png") && setup.poses.size() != 1) {
     throw InputError(options.out, "", fmt::format("one picture for {} frames", setup.poses.size()),
@@ -135,12 +144,13 @@ void render_frames(const FramesOptions& options, bool quiet) {
     Progress progress("rendering", quiet);
     for (std::size_t i = 0; i < setup.poses.size(); ++i) {
       FrameView frame;
-      const FrameRequest request = feed.next();
+      FrameRequest request = feed.next();
       if (options.panorama)
         frame = draw_panorama(setup, request, *view, panorama);
       else
         render_or_throw(*view, request, frame);
-      if (sink) sink->write(frame, layers ? layers->render(request.camera) : FrameLayers{});
+      if (sink)
+        sink->write(frame, layers ? layers->render(request.camera) : FrameLayers{}, request.camera);
       if (options.checked_pixels > 0) {
         const double error = reference_error(setup, i, frame, options.checked_pixels);
         fmt::print("frame {:6}  {:7.2f} dB against the reference\n", setup.first + i,
@@ -163,7 +173,9 @@ void add_frames_command(CLI::App& app) {
   auto options = std::make_shared<FramesOptions>();
   CLI::App* command = app.add_subcommand("frames", "Renders a camera path to pictures or a video");
   add_render_options(*command, options->render);
-  command->add_option("--out", options->out, "A folder of PNG files, or a .png, .y4m or .mp4 file");
+  command->add_option("--out", options->out,
+                      "A folder of PNG files, or a .png, .y4m or .mp4 file. In a folder, pictures "
+                      "have the names that the path's file gives them, else numbers");
   auto* background =
       command
           ->add_option("--background", options->background,
@@ -188,7 +200,9 @@ void add_frames_command(CLI::App& app) {
       "Frames per second (default: 30 for a script, else the rate of the trace, of which a video "
       "gets 30 at most). The trace is resampled, but forecasts use its recorded samples only, and "
       "none of the future");
-  command->footer("A path that stands still is one frame, unless --duration or --frames is given.");
+  command->footer(
+      "A path that stands still is one frame, unless --duration or --frames is given. Without a "
+      "path, the views of a transforms_test.json beside the scene are drawn.");
   command
       ->add_option("--pixels", options->checked_pixels,
                    "Also print the PSNR against the reference at this many random pixels")

@@ -48,11 +48,13 @@ LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
   return loaded;
 }
 
+/// `path`: of the file that tells the lens.
 TraceCheck check(const TraceOptions& options, const LoadedScene& loaded,
-                 const Trajectory& trajectory) {
+                 const Trajectory& trajectory, const CameraPath& path = {}) {
   ThreadPool pool;
+  const Lens lens = path.lenses.empty() ? Lens{} : path.lenses.front();
   return check_trace(trajectory, loaded.scene.cloud.mean, {loaded.bounds, loaded.scene.hints},
-                     make_lens(options.lens, loaded.scene.hints.near_z), pool);
+                     make_lens(options.lens, loaded.scene.hints.near_z, lens), pool);
 }
 
 void print_checked(const std::string& file, const TraceCheck& result) {
@@ -61,8 +63,8 @@ void print_checked(const std::string& file, const TraceCheck& result) {
 }
 
 void write_checked(const TraceOptions& options, const LoadedScene& loaded,
-                   const Trajectory& trajectory, bool quiet) {
-  const TraceCheck result = check(options, loaded, trajectory);
+                   const Trajectory& trajectory, bool quiet, const CameraPath& path = {}) {
+  const TraceCheck result = check(options, loaded, trajectory, path);
   if (!result.valid() && !options.force) {
     throw CheckFailed(
         fmt::format("{}: not written: {}; --force writes it", options.out, result.complaint()));
@@ -120,11 +122,11 @@ void add_anchor(CLI::App& trace) {
       ->check(CLI::Range(1.0, 1000.0));
   command->callback([options, command] {
     const bool quiet = is_quiet(*command);
-    const Trajectory recorded = read_camera_path(options->trace, options->trace_rate_hz).poses;
+    const CameraPath recorded = read_camera_path(options->trace, options->trace_rate_hz);
     const LoadedScene loaded = load_for_trace(*options, quiet);
-    const Trajectory moved = anchored(recorded, loaded.scene.hints);
+    const Trajectory moved = anchored(recorded.poses, loaded.scene.hints);
     write_checked(*options, loaded, options->rate_hz ? resample(moved, *options->rate_hz) : moved,
-                  quiet);
+                  quiet, recorded);
   });
 }
 
@@ -180,7 +182,8 @@ void add_check(CLI::App& trace) {
   command->callback([options, command] {
     const CameraPath path = read_camera_path(options->trace);
     const LoadedScene loaded = load_for_trace(*options, is_quiet(*command));
-    const TraceCheck result = check(*options, loaded, path.poses_about(loaded.scene.hints.origin));
+    const TraceCheck result =
+        check(*options, loaded, path.poses_about(loaded.scene.hints.origin), path);
     if (!result.valid()) {
       throw CheckFailed(fmt::format("{}: {}", options->trace, result.complaint()));
     }

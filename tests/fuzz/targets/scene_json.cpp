@@ -86,23 +86,27 @@ std::map<std::string, std::string> sidecar_seeds() {
 void parse_cameras(Bytes input) {
   const CameraList list = read_camera_json(MemorySource("input", input));
   require(!list.rate_hz || *list.rate_hz > 0.0, "rates are positive");
-  for (const auto& [name, camera] : list.cameras) {
-    require_sound(camera.world_from_camera);
-    if (camera.size_px.x > 0)
-      require(camera.size_px.y > 0 && camera.focal_px.x > 0.0f && camera.focal_px.y > 0.0f,
-              "lenses are whole");
+  for (const ListedCamera& listed : list.cameras) {
+    require_sound(listed.world_from_camera);
+    require((listed.lens.size_px.x > 0) == (listed.lens.size_px.y > 0), "pictures have sides");
+    if (!listed.lens.known()) continue;
+    const Camera camera = make_camera(listed.lens, {64, 48});
+    require(camera.focal_px.x >= 0.0f && camera.focal_px.y >= 0.0f, "lenses are whole");
   }
 }
 
 std::map<std::string, std::string> cameras_seeds() {
-  return {{"cameras", R"([{"id":0,"img_name":"a","width":9,"height":9,"position":[-3,0,0],
+  return {
+      {"cameras", R"([{"id":0,"img_name":"a","width":9,"height":9,"position":[-3,0,0],
                           "rotation":[[0,0,1],[0,1,0],[-1,0,0]],"fy":9.5,"fx":9.5}])"},
-          {"transforms", R"({"camera_angle_x":0.6,"frames":[{"file_path":"a","transform_matrix":
+      {"transforms", R"({"camera_angle_x":0.6,"frames":[{"file_path":"a","transform_matrix":
                              [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]})"},
-          {"path", R"({"camera_type":"perspective","render_width":64,"render_height":48,"fps":24,
+      {"path", R"({"camera_type":"perspective","render_width":64,"render_height":48,"fps":24,
                        "camera_path":[{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,
                        "aspect":1.3}],"seconds":4,"keyframes":[]})"},
-          {"export", R"([{"file_path":"a.png","transform":[[1,0,0,1],[0,1,0,2],[0,0,1,3]]}])"}};
+      {"fisheye", R"({"camera_model":"OPENCV_FISHEYE","fl_x":40,"fl_y":41,"cx":31,"cy":23,"w":64,
+                          "h":48,"k1":0.1,"k2":-2e-3,"x_fov":60,"is_fisheye":true,"frames":[]})"},
+      {"export", R"([{"file_path":"a.png","transform":[[1,0,0,1],[0,1,0,2],[0,0,1,3]]}])"}};
 }
 
 /// Both names lead to one file in memory: writing files anew would take most of a run's time.

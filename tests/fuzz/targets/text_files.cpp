@@ -51,8 +51,8 @@ void parse_colmap(Bytes input) {
   folder.cameras.rewrite(input.subspan(3, length));
   folder.images.rewrite(input.subspan(3 + length));
   for (const ListedCamera& image : read_colmap(folder.folder.path(), Distortion::ignored)) {
-    const Camera& camera = image.camera;
-    const Pose& pose = camera.world_from_camera;
+    const Camera camera = make_camera(image.lens, image.lens.size_px);
+    const Pose& pose = image.world_from_camera;
     require(std::isfinite(glm::length(glm::dvec3(pose.position))), "positions are finite");
     require(std::abs(glm::length(pose.orientation) - 1.0f) < 1e-3f, "orientations have length 1");
     require(camera.size_px.x > 0 && camera.size_px.y > 0, "pictures have sides");

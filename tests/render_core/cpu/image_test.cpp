@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <limits>
+#include <numeric>
 #include <ranges>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "render_core/cpu/kernels.h"
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/frame/renderer.h"
+#include "tests/support/picked.h"
 #include "tests/support/refusal.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
@@ -39,6 +41,27 @@ TEST_P(SmallScenes, ExactMatchesReference) {
     EXPECT_EQ(exact.stats.overflowed_entries, 0u);
     RecordProperty("psnr_" + std::string(simd),
                    std::to_string(test::psnr_db(exact.rgb, reference.rgb)));
+  }
+}
+
+// A level floor from straight above: all of it has one depth.
+TEST(EqualDepths, AreBlendedAlikeWhateverTheOrderOfTheFile) {
+  TestScene scene = test::small_scenes().front();
+  scene.request.camera.world_from_camera = {};
+  GaussianCloud cloud = *scene.cloud;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    cloud.mean[i].z = 4.0f;
+    cloud.opacity[i] = 0.9f;
+  }
+  std::vector<std::uint32_t> backwards(cloud.size());
+  std::iota(backwards.rbegin(), backwards.rend(), 0u);
+  for (const RendererKind kind : {RendererKind::cpu, RendererKind::reference}) {
+    std::vector<std::vector<float>> pictures;
+    for (const GaussianCloud& of : {cloud, test::picked(cloud, backwards)}) {
+      scene.cloud = std::make_shared<const GaussianCloud>(of);
+      pictures.push_back(render(scene, {kind, pool_of(2), "auto"}).rgb);
+    }
+    EXPECT_EQ(pictures[0], pictures[1]);
   }
 }
 

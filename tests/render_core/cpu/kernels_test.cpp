@@ -17,6 +17,7 @@
 #include "render_core/math/ellipse-inl.h"
 #include "render_core/math/projection-inl.h"
 #include "render_core/math/spherical_harmonics-inl.h"
+#include "tests/support/picked.h"
 #include "tests/support/test_scenes.h"
 
 namespace catgs {
@@ -72,18 +73,19 @@ class Kernels : public testing::TestWithParam<TestScene> {
  protected:
   ThreadPool pool_{2};
   const TestScene& scene_ = GetParam();
-  SceneStore store_{*scene_.cloud, pool_};
+  const GaussianCloud cloud_ = test::in_cluster_order(*scene_.cloud, pool_);
+  SceneStore store_{cloud_, pool_};
   const Camera& camera_ = scene_.request.camera;
   glm::ivec2 grid_ = (camera_.size_px + 15) / 16;
 };
 
 TEST_P(Kernels, ProjectionAndShadingMatchDoublePrecision) {
   const auto model = math::make_camera_model(camera_);
-  const GaussianCloud& cloud = *scene_.cloud;
+  const GaussianCloud& cloud = cloud_;
   for (const SimdKernels& kernels : simd_kernels()) {
     SCOPED_TRACE(std::string(kernels.name));
     project_all(store_, camera_, kernels).for_each([&](std::size_t, const Splat& s) {
-      const std::uint32_t i = s.original_index;
+      const std::uint32_t i = s.scene_order;
       const auto mean = to_double(cloud.mean[i]);
       const double depth = math::view_depth(model, mean);
       EXPECT_EQ(s.depth, static_cast<float>(depth));  // the order of blending depends on it
@@ -115,10 +117,10 @@ TEST_P(Kernels, ProjectionAndShadingMatchDoublePrecision) {
 
 TEST_P(Kernels, NoVisibleGaussianIsCulled) {
   const auto model = math::make_camera_model(camera_);
-  const GaussianCloud& cloud = *scene_.cloud;
+  const GaussianCloud& cloud = cloud_;
   std::set<std::uint32_t> visible;
   project_all(store_, camera_, simd_kernels().front()).for_each([&](std::size_t, const Splat& s) {
-    visible.insert(s.original_index);
+    visible.insert(s.scene_order);
   });
 
   for (std::uint32_t i = 0; i < cloud.size(); ++i) {
@@ -194,7 +196,7 @@ TEST_P(Kernels, ListsAreInDepthOrderWithTiesInSceneOrder) {
         const Splat& before = projected.splats[list[i - 1].value];
         const Splat& after = projected.splats[list[i].value];
         ASSERT_TRUE(before.depth < after.depth ||
-                    (before.depth == after.depth && before.original_index < after.original_index));
+                    (before.depth == after.depth && before.scene_order < after.scene_order));
       }
     }
   }

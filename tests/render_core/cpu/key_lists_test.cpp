@@ -19,6 +19,7 @@
 #include "render_core/motion/list_culler.h"
 #include "render_core/synth/synth.h"
 #include "tests/support/camera_moves.h"
+#include "tests/support/picked.h"
 
 namespace catgs {
 namespace {
@@ -103,7 +104,8 @@ class BruteForce {
 TEST(KeyLists, MissNothingOnTheForecastPath) {
   ThreadPool pool(2);
   const Scene scene = synthesize(SynthKind::city, 20'000, 1, pool);
-  const SceneStore store(scene.cloud, pool);
+  const GaussianCloud cloud = test::in_cluster_order(scene.cloud, pool);
+  const SceneStore store(cloud, pool);
   std::mt19937 random(1);
   for (const test::Move& move : test::moves()) {
     SCOPED_TRACE(move.name);
@@ -118,13 +120,13 @@ TEST(KeyLists, MissNothingOnTheForecastPath) {
     list(store, camera_at(0.0f), plan, pool, key);
     std::size_t pairs = 0, missed = 0;
     for (const float share : {0.25f, 0.6f, 1.0f}) {
-      const BruteForce truth(scene.cloud, camera_at(share));
+      const BruteForce truth(cloud, camera_at(share));
       for (int k = 0; k < 80; ++k) {
         const glm::ivec2 pixel(random() % 320, random() % 192);
         const auto tile = static_cast<std::size_t>(pixel.y / 16 * 20 + pixel.x / 16);
         std::set<std::uint32_t> listed;
         for (const DepthSlot& entry : key.lists.list(tile))
-          listed.insert(key.splats[entry.value].original_index);
+          listed.insert(key.splats[entry.value].scene_order);
         truth.at(glm::dvec2(pixel) + 0.5, [&](std::uint32_t index) {
           ++pairs;
           missed += listed.contains(index) ? 0 : 1;

@@ -20,11 +20,11 @@ TEST(SceneStore, ForgottenClustersGiveTheirMemoryBack) {
     return store.attribute(SceneStore::factor_xx)[c * cluster_size];
   };
   EXPECT_EQ(value(24), 0.0f);
-  EXPECT_EQ(store.original_index()[24 * cluster_size], 0u);
+  EXPECT_EQ(store.scene_order()[24 * cluster_size], 0u);
   EXPECT_EQ(store.sh_of_packet(24 * cluster_size / packet_size)[0], 0.0f);
   for (const std::size_t c : {15, 32}) {
     EXPECT_EQ(value(c), 1.0f) << "a neighbour";
-    EXPECT_EQ(store.original_index()[c * cluster_size], 7u);
+    EXPECT_EQ(store.scene_order()[c * cluster_size], 7u);
     EXPECT_NE(store.sh_of_packet(c * cluster_size / packet_size)[0], 0.0f);
   }
 }

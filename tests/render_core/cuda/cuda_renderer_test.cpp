@@ -27,8 +27,8 @@ class CudaSmallScenes : public test::CoreTest, public testing::WithParamInterfac
 using CudaRenderer = test::CoreTest;
 
 TEST_P(CudaSmallScenes, MatchesReference) {
-  const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
-  const auto reference = render(*renderer_of(ordered, RendererKind::reference), scene.request);
+  const TestScene& scene = GetParam();
+  const auto reference = render(*renderer_of(scene, RendererKind::reference), scene.request);
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request);
   EXPECT_GE(test::psnr_db(cuda.rgb, reference.rgb), 60.0);
   EXPECT_EQ(cuda.stats.overflowed_entries, 0u);
@@ -105,10 +105,10 @@ TEST_P(CudaSmallScenes, SplittingChangesNothing) {
 }
 
 TEST_P(CudaSmallScenes, VanillaIsTheCpuCores) {
-  const TestScene &scene = GetParam(), ordered = test::in_cluster_order(scene);
+  const TestScene& scene = GetParam();
   const ViewSettings vanilla{.pipeline = Pipeline::vanilla};
   const auto cuda = render(*renderer_of(scene, RendererKind::cuda), scene.request, vanilla);
-  const auto cpu = render(*renderer_of(ordered, RendererKind::cpu), scene.request, vanilla);
+  const auto cpu = render(*renderer_of(scene, RendererKind::cpu), scene.request, vanilla);
   EXPECT_GE(test::psnr_db(cuda.rgb, cpu.rgb), 55.0);
   EXPECT_NEAR(static_cast<double>(cuda.stats.list_entries),
               static_cast<double>(cpu.stats.list_entries),

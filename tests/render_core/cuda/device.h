@@ -8,11 +8,8 @@
 #include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
 
-#include "render_core/base/thread_pool.h"
 #include "render_core/frame/renderer.h"
-#include "render_core/scene/clusters.h"
 #include "tests/render_core/cores/core_test.h"
-#include "tests/support/picked.h"
 #include "tests/support/rendered.h"
 #include "tests/support/test_scenes.h"
 
@@ -32,14 +29,6 @@ inline TestScene random_scene(std::size_t count) {
   scene.name = "random";
   scene.cloud = std::make_shared<const GaussianCloud>(random_cloud(count, 3, 7));
   scene.request.camera = make_camera(Pose{}, {640, 360}, 400.0f);
-  return scene;
-}
-
-/// The scene in the order of its clusters, in which the CUDA core blends equal depths.
-inline TestScene in_cluster_order(TestScene scene) {
-  ThreadPool pool(2);
-  scene.cloud = std::make_shared<const GaussianCloud>(
-      picked(*scene.cloud, morton_order(scene.cloud->mean, pool)));
   return scene;
 }
 

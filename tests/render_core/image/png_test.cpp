@@ -16,6 +16,8 @@ namespace catgs {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::Pointwise;
 
 class Png : public ::testing::Test {
  protected:
@@ -49,6 +51,20 @@ TEST_F(Png, AlphaBelongsToColoursOverBlack) {
   const std::vector<float> alpha = {0.5f, 0.0f, 1.0f};
   write_png(path_, {{3, 1}, {0.25f, 0.5f, 0, 0, 0, 0, 0.2f, 0.4f, 0.6f}}, alpha);
   EXPECT_THAT(test::read_rgba(path_), ElementsAre(128, 255, 0, 128, 0, 0, 0, 0, 51, 102, 153, 255));
+  const std::vector<float> over_black = {0.252f, 0.502f, 0, 0, 0, 0, 0.2f, 0.4f, 0.6f};
+  EXPECT_THAT(read_png(path_).rgb, Pointwise(FloatNear(1e-3f), over_black));
+}
+
+TEST_F(Png, KeepsATextOnceAndBeforeItsPixels) {
+  write_png(path_, ramp(8, 8), {}, {}, {"key", "some words"});
+  EXPECT_EQ(text_in_png(path_, "key"), "some words");
+  EXPECT_EQ(text_in_png(path_, "ke"), "");
+  EXPECT_EQ(read_png(path_).rgb, ramp(8, 8).rgb);
+  write_png(path_, ramp(8, 8));
+  EXPECT_EQ(text_in_png(path_, "key"), "");
+  for (const char* other : {"", "no picture", "\x89PNG\r\n\x1a\n\xff\xff\xff\xfftEXt"})
+    EXPECT_EQ(text_in_png(folder_.write("other.png", other), "key"), "");
+  EXPECT_EQ(text_in_png(folder_ / "absent.png", "key"), "");
 }
 
 TEST_F(Png, RefusesWhatIsNoPicture) {

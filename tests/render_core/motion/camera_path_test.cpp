@@ -37,12 +37,16 @@ class CameraPaths : public ::testing::Test {
     expect_camera(path.poses[1].world_from_camera);
   }
 
+  /// The lens of all poses, in a picture of `size_px`.
   static void expect_lens(const CameraPath& path, glm::ivec2 size_px, glm::vec2 focal_px,
                           glm::vec2 principal_point_px) {
-    ASSERT_TRUE(path.lens.has_value());
-    EXPECT_EQ(path.lens->size_px, size_px);
-    EXPECT_LT(glm::distance(path.lens->focal_px, focal_px), 1e-3f);
-    EXPECT_EQ(path.lens->principal_point_px, principal_point_px);
+    ASSERT_EQ(path.lenses.size(), path.poses.size());
+    for (const Lens& lens : path.lenses) {
+      ASSERT_TRUE(lens.known());
+      const Camera camera = make_camera(lens, size_px);
+      EXPECT_LT(glm::distance(camera.focal_px, focal_px), 1e-3f);
+      EXPECT_LT(glm::distance(camera.principal_point_px, principal_point_px), 1e-4f);
+    }
   }
 
   const test::TemporaryFolder folder_;
@@ -53,7 +57,7 @@ TEST_F(CameraPaths, Tum) {
                                "0 0 0 0 0 0 0 1\n"
                                "0.5 1 2 3 0 0.70710678 0 0.70710678\n");
   expect_path(path, 500'000);
-  EXPECT_FALSE(path.lens.has_value());
+  EXPECT_TRUE(path.lenses.empty() && path.names.empty());
 }
 
 TEST_F(CameraPaths, CamerasOfATrainingInTheOrderOfTheirNames) {
@@ -67,10 +71,8 @@ TEST_F(CameraPaths, CamerasOfATrainingInTheOrderOfTheirNames) {
       read("cameras.json", fmt::format("[{}, {}]", camera("b", "[1, 2, 3]", our_rows, 40), first));
   expect_path(path, 33'333);
   expect_lens(path, {64, 48}, {40, 41}, {32, 24});
-  const CameraPath zoomed =
-      read("cameras.json", fmt::format("[{}, {}]", first, camera("b", "[1, 2, 3]", our_rows, 80)));
-  EXPECT_TRUE(zoomed.lenses_differ);
-  EXPECT_FALSE(zoomed.lens.has_value());
+  EXPECT_EQ(path.lenses[0].size_px, glm::ivec2(64, 48));
+  EXPECT_EQ(path.names, (std::vector<std::string>{"a", "b"}));
 }
 
 TEST_F(CameraPaths, TransformsOfADataSet) {
@@ -87,7 +89,85 @@ TEST_F(CameraPaths, TransformsOfADataSet) {
   const CameraPath blender = read(
       "transforms_test.json", R"({"camera_angle_x": 1.5707963, "w": 64, "h": 48, )" + frames + "}");
   expect_lens(blender, {64, 48}, {32, 32}, {32, 24});
-  EXPECT_FALSE(read("no_size.json", R"({"camera_angle_x": 1.57, )" + frames + "}").lens);
+  EXPECT_EQ(blender.names, (std::vector<std::string>{"b", "a"}));
+}
+
+// Focal lengths follow the picture's height, and a lone horizontal angle its width.
+TEST_F(CameraPaths, LensesFitPicturesOfAnySize) {
+  struct Case {
+    const char* fields;
+    glm::ivec2 size_px;
+    glm::vec2 focal_px, principal_point_px;
+  };
+  const char* pose = "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
+  constexpr const char* whole = R"("fl_x": 40, "fl_y": 41, "cx": 31, "cy": 23, "w": 64, "h": 48)";
+  for (const auto& [fields, size_px, focal_px, principal_point_px] : std::vector<Case>{
+           {R"("camera_angle_x": 1.5707963268)", {64, 48}, {32, 32}, {32, 24}},
+           {R"("camera_angle_x": 1.5707963268)", {800, 800}, {400, 400}, {400, 400}},
+           {R"("camera_angle_y": 1.5707963268)", {64, 48}, {24, 24}, {32, 24}},
+           {R"("x_fov": 90)", {64, 48}, {32, 32}, {32, 24}},
+           {R"("y_fov": 90)", {64, 48}, {24, 24}, {32, 24}},
+           {R"("camera_angle_x": 1.5707963268, "camera_angle_y": 1.5707963268)",
+            {64, 48},
+            {24, 24},
+            {32, 24}},
+           {R"("camera_angle_x": 1.5707963268, "w": 64, "h": 48)", {32, 24}, {16, 16}, {16, 12}},
+           {R"("camera_angle_x": 1.5707963268, "w": 64, "h": 48)", {96, 48}, {32, 32}, {48, 24}},
+           {whole, {64, 48}, {40, 41}, {31, 23}},
+           {whole, {32, 24}, {20, 20.5f}, {15.5f, 11.5f}},
+           {whole, {64, 24}, {20, 20.5f}, {31.5f, 11.5f}},
+           {whole, {21, 16}, {13.125f, 13.6667f}, {10.171875f, 7.66667f}},
+       }) {
+    SCOPED_TRACE(fmt::format("{} at {}x{}", fields, size_px.x, size_px.y));
+    expect_lens(read("a.json", fmt::format(R"({{{}, "frames": [{{"transform_matrix": {}}}]}})",
+                                           fields, pose)),
+                size_px, focal_px, principal_point_px);
+    expect_lens(read("b.json", fmt::format(R"({{"frames": [{{{}, "transform_matrix": {}}}]}})",
+                                           fields, pose)),
+                size_px, focal_px, principal_point_px);
+  }
+  expect_lens(
+      read("path.json",
+           fmt::format(R"({{"camera_path": [{{"camera_to_world": {}, "fov": 90}}]}})", pose)),
+      {64, 48}, {24, 24}, {32, 24});
+}
+
+TEST_F(CameraPaths, LensesThatBendLinesAreNamed) {
+  struct Case {
+    const char *fields, *distortion;
+    bool known = true;
+  };
+  const char* frames =
+      R"("frames": [{"transform_matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}])";
+  for (const auto& [fields, distortion, known] : std::vector<Case>{
+           {R"("camera_model": "OPENCV", "k1": 0, "p2": 0.0)", ""},
+           {R"("camera_model": "PINHOLE")", ""},
+           {R"("is_fisheye": false)", ""},
+           {R"("camera_model": "OPENCV", "k1": 0.1, "p2": -0.02)", "OPENCV k1 0.1 p2 -0.02"},
+           {R"("k1": 0.1)", "k1 0.1"},
+           {R"("camera_model": "OPENCV_FISHEYE", "k1": 0)", "OPENCV_FISHEYE"},
+           {R"("is_fisheye": true, "k4": 0.5)", "FISHEYE k4 0.5"},
+           {R"("camera_model": "novel")", "NOVEL"},
+           {R"("ftheta_p1": 0.01)", "ftheta_p1 0.01"},
+           {R"("camera_model": "EQUIRECTANGULAR")", "EQUIRECTANGULAR", false},
+           {R"("camera_model": "VR180_L")", "VR180_L", false},
+           {R"("latlong": true)", "EQUIRECTANGULAR", false},
+       }) {
+    const CameraPath path =
+        read("a.json", fmt::format(R"({{{}, "fl_x": 40, "w": 64, "h": 48, {}}})", fields, frames));
+    EXPECT_EQ(path.lenses.at(0).distortion, distortion) << fields;
+    EXPECT_EQ(path.lenses.at(0).known(), known) << fields;
+  }
+  for (const auto& [camera, distortion] : std::vector<std::pair<const char*, const char*>>{
+           {"OPENCV 64 48 40 41 31 23 0 0 0 0", ""},
+           {"SIMPLE_RADIAL 64 48 40 31 23 0.25", "SIMPLE_RADIAL 0.25"},
+           {"FOV 64 48 40 41 31 23 0.5", "FOV 0.5"},
+           {"OPENCV_FISHEYE 64 48 40 41 31 23 0 0 0 0", "OPENCV_FISHEYE 0, 0, 0, 0"},
+       }) {
+    folder_.write("cameras.txt", fmt::format("5 {}\n", camera));
+    const auto images = folder_.write("images.txt", "1 1 0 0 0 0 0 0 5 a.jpg\n\n");
+    EXPECT_EQ(read_camera_path(images).lenses.at(0).distortion, distortion) << camera;
+  }
 }
 
 TEST_F(CameraPaths, TheViewersPathHasItsOwnTimesAndLens) {

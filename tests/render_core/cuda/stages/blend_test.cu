@@ -37,7 +37,7 @@ class BlendStage : public StageTest {
       s.red = static_cast<float>(random() % 129) / 128.0f;
       s.green = static_cast<float>(random() % 129) / 128.0f;
       s.blue = static_cast<float>(random() % 129) / 128.0f;
-      s.original_index = i;
+      s.scene_order = i;
       s.depth = static_cast<float>(i);
       splats_.push_back(s);
       SplatRecord record{};

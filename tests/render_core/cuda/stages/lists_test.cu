@@ -192,7 +192,9 @@ using Entry = std::pair<std::uint32_t, std::uint32_t>;  // tile, index in the cl
 std::set<Entry> cpu_entries(const StagedLists& lists) {
   constexpr std::uint32_t ratio = tile_side_px / tile_size_px;
   std::set<Entry> entries;
-  for (const auto& found : lists.on_cpu()) {
+  const auto on_cpu = lists.on_cpu();
+  for (std::uint32_t i = 0; i < on_cpu.size(); ++i) {
+    const auto& found = on_cpu[i];
     if (!found) continue;
     std::vector<TileRun> runs;
     const catgs::SplatPath path = found->path.value_or(catgs::SplatPath{});
@@ -205,7 +207,7 @@ std::set<Entry> cpu_entries(const StagedLists& lists) {
       for (std::uint32_t column = run.begin; column < run.end; ++column)
         entries.emplace(
             run.row / ratio * static_cast<std::uint32_t>(lists.shape().tiles_x) + column / ratio,
-            found->splat.original_index);
+            i);
   }
   return entries;
 }

@@ -190,8 +190,8 @@ class StagedLists {
            .paths = sweeps ? paths.data() : nullptr,
            .members = sweeps ? &members : nullptr});
       for (std::uint32_t i = 0; i < summary.visible; ++i)
-        found[splats[i].original_index] = {splats[i],
-                                           sweeps ? std::optional(paths[i]) : std::nullopt};
+        found[scene_.order[splats[i].scene_order]] = {
+            splats[i], sweeps ? std::optional(paths[i]) : std::nullopt};
     }
     return found;
   }

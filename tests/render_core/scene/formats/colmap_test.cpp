@@ -73,11 +73,11 @@ class Colmap : public FolderTest {
     ASSERT_EQ(images.size(), 2u);
     EXPECT_EQ(images[0].name, "a.jpg");
     EXPECT_EQ(images[1].name, "b.jpg");
-    const Camera& camera = images[1].camera;
+    const Camera camera = make_camera(images[1].lens, images[1].lens.size_px);
     EXPECT_EQ(camera.size_px, glm::ivec2(640, 480));
     EXPECT_EQ(camera.focal_px, glm::vec2(500, 510));
     EXPECT_EQ(camera.principal_point_px, glm::vec2(321, 239));
-    const Pose& pose = camera.world_from_camera;
+    const Pose& pose = images[1].world_from_camera;
     EXPECT_NEAR(pose.position.x, 1.0f, 1e-6f);
     EXPECT_NEAR(pose.position.y, 2.0f, 1e-6f);
     EXPECT_NEAR(pose.position.z, 3.0f, 1e-6f);
@@ -192,8 +192,9 @@ TEST_F(Colmap, DistortionCanBeIgnored) {
   write("cameras.txt", "5 SIMPLE_RADIAL 640 480 500 321 239 0.1\n");
   const auto images = read_colmap(folder_.path(), Distortion::ignored);
   ASSERT_EQ(images.size(), 2u);
-  EXPECT_EQ(images[0].camera.focal_px, glm::vec2(500, 500));
-  EXPECT_EQ(images[0].camera.principal_point_px, glm::vec2(321, 239));
+  const Camera camera = make_camera(images[0].lens, {640, 480});
+  EXPECT_EQ(camera.focal_px, glm::vec2(500, 500));
+  EXPECT_EQ(camera.principal_point_px, glm::vec2(321, 239));
   write("cameras.txt", "5 SIMPLE_RADIAL 640 480 500 321 239\n");
   EXPECT_THROW((void)read_colmap(folder_.path(), Distortion::ignored), InputError);
 }

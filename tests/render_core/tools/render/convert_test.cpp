@@ -184,6 +184,60 @@ TEST_F(Convert, FarScenesKeepTheirCoordinates) {
   EXPECT_EQ(run(fmt::format("convert {} {}", path("far.ply"), path("far.sog"))).exit_code, 2);
 }
 
+TEST_F(Convert, OutputsBeginWhereTheirInputDoes) {
+  const auto hints_of = [&](const std::string& name) {
+    nlohmann::json hints = info(name).at("hints");
+    hints.erase("source");
+    hints.erase("scale");  // no sidecar tells it
+    return hints;
+  };
+  const nlohmann::json hints = hints_of("ball.ply");
+  for (const char* how : {"few.spz --merge 5%", "half.ply --crop=-5,0,-5,5,5,5", "all.tree"}) {
+    const Outcome outcome = convert(how, "");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+    EXPECT_THAT(outcome.out, HasSubstr(".json: first view, estimated")) << how;
+    const std::string sidecar = std::string(how).substr(0, std::string(how).find('.')) + ".json";
+    EXPECT_EQ(nlohmann::json::parse(std::ifstream(path(sidecar))),
+              nlohmann::json::parse(std::ifstream(path("few.json"))))
+        << how;
+  }
+  EXPECT_EQ(hints_of("few.spz"), hints);
+  // Pictures of both are of the same cameras.
+  for (const auto& [name, out] : {std::pair{"ball.ply", "a"}, std::pair{"few.spz", "b"}})
+    ASSERT_EQ(run(fmt::format("frames {} --script orbit --size 64x48 --fps 2 --duration 1 "
+                              "--renderer cpu --out {}",
+                              path(name), path(out)))
+                  .exit_code,
+              0);
+  const Outcome compared = run(fmt::format("compare --json {} {}", path("a"), path("b")));
+  EXPECT_TRUE(nlohmann::json::parse(compared.out).at("cameras_differ").is_null()) << compared.out;
+
+  std::ofstream(path("own.json")) << R"({"near": 0.5})";
+  EXPECT_THAT(convert("own.ply", "").out, HasSubstr("own.json exists and was left as it is"));
+  EXPECT_EQ(std::filesystem::file_size(path("own.json")), 13u);
+  // The same command a second time finds the sidecar that it has written.
+  for (int time = 0; time < 2; ++time)
+    EXPECT_EQ(convert("twice.ply", "--rotate=0,30,0 --scale 3").exit_code, 0);
+  EXPECT_EQ(convert("twice.ply", "--rotate=0,31,0 --scale 3").exit_code, 2);
+  // A moved view is not that of the input, which has the same sidecar.
+  const Outcome moved = convert("ball.spz", "--scale 2");
+  EXPECT_EQ(moved.exit_code, 0) << moved.out;
+  EXPECT_THAT(moved.out, HasSubstr("ball.json was not written"));
+  EXPECT_EQ(hints_of("ball.ply"), hints);
+}
+
+TEST_F(Convert, ALoneGaussianKeepsItsView) {
+  GaussianCloud cloud = ball();
+  cloud.resize(1, 0);
+  for (const float far : {0.0f, 3e6f}) {
+    cloud.mean[0] = {far, -far, far};
+    save_scene(cloud, path("one.ply"));
+    ASSERT_EQ(run(fmt::format("convert {} {}", path("one.ply"), path("one.glb"))).exit_code, 0);
+    EXPECT_EQ(info("one.glb").at("hints").at("source"), "sidecar one.json") << far;
+    std::filesystem::remove(path("one.json"));
+  }
+}
+
 TEST_F(Convert, MergesAndRemovesFloaters) {
   for (const char* merge : {"100", "25%"}) {
     const Outcome outcome = convert("merged.ply", fmt::format("--merge {}", merge));

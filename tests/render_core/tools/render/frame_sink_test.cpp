@@ -1,8 +1,11 @@
 #include "render_core/tools/render/frame_sink.h"
 
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -56,11 +59,34 @@ TEST_F(FrameSinkTest, AFolderGetsNumberedPictures) {
   const auto folder = sink("new/pictures");
   HostImage image;
   const FrameView frame = grey_frame(image, folder->format(), {16, 8});
-  folder->write(frame, {});
-  folder->write(frame, {});
+  folder->write(frame, {}, {});
+  folder->write(frame, {}, {});
   folder->finish();
   EXPECT_EQ(read_png(folder_ / "new/pictures/frame_000007.png").size_px, glm::ivec2(16, 8));
   EXPECT_NEAR(read_png(folder_ / "new/pictures/frame_000008.png").rgb[0], 0.5f, 0.003f);
+}
+
+TEST_F(FrameSinkTest, PicturesHaveTheNamesOfTheirPath) {
+  using Names = std::vector<std::string>;
+  const auto folder = make_frame_sink({.path = folder_ / "named",
+                                       .size_px = {16, 8},
+                                       .names = picture_names({"./test/r_0", "images/b.1.JPG"})});
+  HostImage image;
+  for (int i = 0; i < 2; ++i) folder->write(grey_frame(image, folder->format(), {16, 8}), {}, {});
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "named/r_0.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "named/b.1.png"));
+  for (const auto& [of_path, names] : std::vector<std::pair<Names, Names>>{
+           {{"a/1.jpg", "b/1.jpg"}, {"a_1", "b_1"}},
+           {{"frame.0001", "frame.0002"}, {"frame.0001", "frame.0002"}},
+           {{"../../etc/passwd", "x"}, {"passwd", "x"}},
+           {{"a.png", "a.jpg"}, {}},
+           {{"", "b"}, {}},
+           {{".."}, {}},
+           {{"a\nb"}, {}},
+           {{std::string("a\0b", 3)}, {}},
+           {{std::string(300, 'a')}, {}},
+       })
+    EXPECT_EQ(picture_names(of_path), names) << of_path[0];
 }
 
 TEST_F(FrameSinkTest, Y4mIsTaggedAndComplete) {
@@ -68,8 +94,8 @@ TEST_F(FrameSinkTest, Y4mIsTaggedAndComplete) {
   ASSERT_EQ(video->format(), PixelFormat::i420);
   HostImage image;
   const FrameView frame = grey_frame(image, PixelFormat::i420, {16, 8});
-  video->write(frame, {});
-  video->write(frame, {});
+  video->write(frame, {}, {});
+  video->write(frame, {}, {});
   video->finish();
   const std::string header = "YUV4MPEG2 W16 H8 F29970:1000 Ip A1:1 C420jpeg XCOLORRANGE=LIMITED\n";
   const std::string picture =
@@ -85,7 +111,7 @@ TEST_F(FrameSinkTest, Mp4IsCompleteOrRefused) {
     GTEST_SKIP() << error.what();
   }
   HostImage image;
-  for (int i = 0; i < 5; ++i) video->write(grey_frame(image, PixelFormat::i420, {16, 8}), {});
+  for (int i = 0; i < 5; ++i) video->write(grey_frame(image, PixelFormat::i420, {16, 8}), {}, {});
   video->finish();
   const std::string bytes = bytes_of("a.mp4");
   EXPECT_THAT(bytes.substr(4), StartsWith("ftyp"));

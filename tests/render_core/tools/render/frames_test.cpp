@@ -10,6 +10,8 @@
 #include <initializer_list>
 #include <iterator>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -31,6 +33,7 @@ using test::Outcome;
 using test::run;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// A wall of opaque, flat Gaussians at z = 3 before the right half of a camera at the origin.
 GaussianCloud wall() {
@@ -191,6 +194,125 @@ TEST_F(Frames, CompareTakesFolders) {
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_THAT(missing.out, HasSubstr("three: is missing"));
   EXPECT_EQ(run(fmt::format("compare {} {}", path("a"), path("b/one.png"))).exit_code, 2);
+}
+
+constexpr const char* identity = "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
+/// A turn of OpenGL axes into ours.
+constexpr const char* ahead = "[1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]";
+
+// Wherever cameras come from, the picture is that of --focal-px.
+TEST_F(Frames, TheLensOfThePathIsDrawnAtAnySize) {
+  struct Case {
+    const char *file, *text, *flags;
+    const char *size, *focal_px;
+    const char* note = "";
+  };
+  constexpr const char* blender =
+      R"({{"camera_angle_x": 1.5707963268, "frames": [{{"transform_matrix": {}}}]}})";
+  constexpr const char* fisheye =
+      R"({{"camera_model": "OPENCV_FISHEYE", "k1": 0.25, "w": 64, "h": 48, "fl_x": 50,
+           "frames": [{{"transform_matrix": {}}}]}})";
+  constexpr const char* viewer = R"({{"camera_path": [{{"camera_to_world": {}, "fov": 90}}]}})";
+  constexpr const char* training =
+      R"([{"img_name": "a", "width": 64, "height": 48, "fx": 50, "fy": 50, "position": [0, 0, 0],
+           "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}])";
+  for (const auto& [file, text, flags, size, focal_px, note] : std::vector<Case>{
+           {"transforms_test.json", blender, "--size 60x60", "60x60", "30"},
+           {"transforms_test.json", blender, "", "1280x720", "640", "tells no size; 1280x720"},
+           {"camera_path.json", viewer, "--size 80x48", "80x48", "24"},
+           {"transforms.json", fisheye, "", "64x48", "50", "without its OPENCV_FISHEYE k1 0.25"},
+           {"transforms.json", fisheye, "--fov-deg 90", "64x48", "24"},
+           {"cameras.json", training, "--size 128x96", "128x96", "100"},
+           {"cameras.json", training, "--focal-px 70", "64x48", "70"},
+           {"sparse/0/images.txt", "1 1 0 0 0 0 0 0 5 a.jpg\n\n", "--size 32x24", "32x24", "25"},
+           {"tour.json", viewer, "--size 40x24", "40x24", "12"},
+       }) {
+    folder_.write("sparse/0/cameras.txt", "5 SIMPLE_PINHOLE 64 48 50 32 24\n");
+    folder_.write(file, std::string_view(text).find("{{") == std::string_view::npos
+                            ? text
+                            : fmt::format(fmt::runtime(text), ahead));
+    const bool tour = std::string_view(file) == "tour.json";
+    const auto draw_to = [&](const char* out, const std::string& how) {
+      const Outcome outcome =
+          run(fmt::format("--quiet frames {} --near 0.1 --renderer cpu {} --out {}",
+                          path("wall.ply"), how, path(out)));
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+      return outcome.out;
+    };
+    SCOPED_TRACE(fmt::format("{} {}", file, flags));
+    const std::string said =
+        draw_to("a.png", fmt::format("{}{} {} {}", tour ? "--script tour:" : "--trace ", path(file),
+                                     tour ? "--frames 0:1" : "", flags));
+    EXPECT_THAT(said, HasSubstr(note));
+    draw_to("b.png",
+            fmt::format("--trace {} --size {} --focal-px {}", path("still.tum"), size, focal_px));
+    EXPECT_EQ(read_png(path("a.png")).rgb, read_png(path("b.png")).rgb);
+  }
+}
+
+TEST_F(Frames, EachPictureHasItsOwnLensAndName) {
+  folder_.write("transforms_test.json", fmt::format(R"({{"w": 64, "h": 48, "frames": [
+      {{"file_path": "./test/r_0", "fl_x": 30, "transform_matrix": {0}}},
+      {{"file_path": "./test/r_1", "fl_x": 60, "transform_matrix": {0}}}]}})",
+                                                    ahead));
+  // Found beside the scene, as test views.
+  const std::string start =
+      fmt::format("--quiet frames {} --near 0.1 --renderer cpu ", path("wall.ply"));
+  const Outcome views = run(start + "--out " + path("views"));
+  ASSERT_EQ(views.exit_code, 0) << views.out;
+  EXPECT_EQ(files_in("views"), 2u);
+  for (const auto& [name, focal_px] : {std::pair{"r_0", 30}, std::pair{"r_1", 60}}) {
+    ASSERT_EQ(run(fmt::format("{} --size 64x48 --focal-px {} --trace {} --out {}", start, focal_px,
+                              path("still.tum"), path("one.png")))
+                  .exit_code,
+              0);
+    EXPECT_EQ(read_png(path(fmt::format("views/{}.png", name))).rgb, read_png(path("one.png")).rgb)
+        << name;
+  }
+  const Outcome second = run(start + "--frames 1:2 --out " + path("second"));
+  EXPECT_TRUE(std::filesystem::exists(path("second/r_1.png"))) << second.out;
+  const Outcome resampled = run(start + "--fps 60 --out " + path("no"));
+  EXPECT_EQ(resampled.exit_code, 2);
+  EXPECT_THAT(resampled.out, HasSubstr("transforms_test.json: its cameras have several lenses"));
+}
+
+TEST_F(Frames, RefusesLensesThatNoPictureShows) {
+  for (const auto& [fields, word] : std::initializer_list<std::array<const char*, 2>>{
+           {R"("camera_model": "EQUIRECTANGULAR", "w": 64, "h": 32)", "EQUIRECTANGULAR"},
+           {R"("is_fisheye": true)", "FISHEYE"}}) {
+    const auto file = folder_.write(
+        "a.json",
+        fmt::format(R"({{{}, "frames": [{{"transform_matrix": {}}}]}})", fields, identity));
+    const std::string start =
+        fmt::format("frames {} --renderer cpu --trace {} ", path("wall.ply"), file.string());
+    const Outcome refused = run(start + "--size 64x48 --out " + path("no.png"));
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.out, AllOf(HasSubstr(word), HasSubstr("--fov-deg")));
+    for (const char* flags : {"--fov-deg 60 --size 64x48", "--panorama --size 64x32"})
+      EXPECT_EQ(run(start + flags + " --out " + path("a.png")).exit_code, 0) << flags;
+  }
+}
+
+TEST_F(Frames, CompareNotesOtherCameras) {
+  write_tum(path("aside.tum"), {{0, {{0.25f, 0, 0}, {1, 0, 0, 0}}}});
+  draw("a.png", "");
+  ASSERT_EQ(frames(fmt::format("--trace {} --out {}", path("aside.tum"), path("b.png"))).exit_code,
+            0);
+  ASSERT_EQ(run(fmt::format("--quiet frames {} --size 64x48 --focal-px 41 --near 0.1 --renderer "
+                            "cpu --trace {} --out {}",
+                            path("wall.ply"), path("still.tum"), path("c.png")))
+                .exit_code,
+            0);
+  const auto compare = [&](const std::string& pictures) { return run("compare " + pictures).out; };
+  EXPECT_THAT(compare(path("a.png") + " " + path("b.png")),
+              AllOf(HasSubstr("0.25 units, 0 degrees"), HasSubstr("frames --trace path.tum")));
+  EXPECT_THAT(compare(path("a.png") + " " + path("c.png")), HasSubstr("1 px of focal length"));
+  EXPECT_THAT(compare(path("a.png") + " " + path("a.png")), Not(HasSubstr("other cameras")));
+  for (const char* folder : {"x", "y"}) std::filesystem::create_directory(path(folder));
+  for (const char* to : {"x/1.png", "x/2.png", "y/1.png"})
+    std::filesystem::copy_file(path("a.png"), path(to));
+  std::filesystem::copy_file(path("b.png"), path("y/2.png"));
+  EXPECT_THAT(compare(path("x") + " " + path("y")), HasSubstr("note: 1 pictures were drawn by"));
 }
 
 TEST_F(Frames, APanoramaShowsAllAround) {

@@ -124,18 +124,18 @@ TEST_F(Trace, PathsOfOtherProgramsBringTheirLens) {
   };
   const auto draw = [&](const std::string& cameras, const std::string& flags) {
     folder_.write("cameras.json", "[" + cameras + "]");
-    return run(fmt::format("frames {} --trace {} --frames :1 --out {} {}", scene(),
-                           path("cameras.json"), path("a.png"), flags));
+    return run(fmt::format("frames {} --trace {} {}", scene(), path("cameras.json"), flags));
   };
-  Outcome outcome = draw(camera(40), "");
+  const std::string one = "--frames :1 --out " + path("a.png"), both = "--out " + path("both");
+  Outcome outcome = draw(camera(40), one);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
   EXPECT_EQ(read_png(path("a.png")).size_px, glm::ivec2(40, 30));
-  outcome = draw(camera(40) + "," + camera(44), "");
+  outcome = draw(camera(40) + "," + camera(44), both);
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.out, HasSubstr("its cameras have several lenses (choose one with --size"));
-  outcome = draw(camera(40) + "," + camera(44), "--size 64x48");
+  EXPECT_THAT(outcome.out, HasSubstr("its pictures have several sizes (choose one with --size"));
+  outcome = draw(camera(40) + "," + camera(44), both + " --size 64x48");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
-  EXPECT_EQ(read_png(path("a.png")).size_px, glm::ivec2(64, 48));
+  EXPECT_EQ(read_png(path("both/frame_000001.png")).size_px, glm::ivec2(64, 48));
 
   for (const std::string& command :
        {std::string("bench --size 64x48 --warmup 0 --trace-rate 60"), std::string("trace check"),
