@@ -29,10 +29,10 @@ namespace {
 
 constexpr std::size_t max_parts = 4096, max_primitives = 65'536;
 constexpr std::string_view extension_name = "KHR_gaussian_splatting";
-// The last is the first draft, which has no extension around it.
-constexpr std::array<std::string_view, 3> spz_extension_names = {
+// The last two are drafts that may have no extension around them.
+constexpr std::array<std::string_view, 4> spz_extension_names = {
     "KHR_gaussian_splatting_compression_spz_2", "KHR_gaussian_splatting_compression_spz",
-    "KHR_spz_gaussian_splats_compression"};
+    "KHR_spz_gaussian_splats_compression", "KHR_spz_compression"};
 
 /// A primitive with Gaussians at a node.
 struct Part {

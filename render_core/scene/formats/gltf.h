@@ -26,7 +26,7 @@ struct SceneFormat;
 // directions. Opaque surfaces then look as they should, and blended edges a little darker.
 //
 // A primitive may hold an .spz (KHR_gaussian_splatting_compression_spz_2, a draft that Cesium's
-// tiles use, and two earlier names of it). Its numbers are those of glTF as they are stored, as
+// tiles use, and three earlier names of it). Its numbers are those of glTF as they are stored, as
 // CesiumJS reads them, whatever axes the .spz names.
 
 struct GltfSize {

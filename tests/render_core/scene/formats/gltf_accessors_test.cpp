@@ -152,8 +152,8 @@ TEST(Gltf, EarlierNamesOfTheSpzExtensionAreKnown) {
   const GaussianCloud wanted = parse_gltf(gltf_with_spz(spz).glb()).cloud;
   const Json view = {{"bufferView", 0}};
   for (const char* name :
-       {"KHR_spz_gaussian_splats_compression", "KHR_gaussian_splatting_compression_spz",
-        "KHR_gaussian_splatting_compression_spz_2"})
+       {"KHR_spz_compression", "KHR_spz_gaussian_splats_compression",
+        "KHR_gaussian_splatting_compression_spz", "KHR_gaussian_splatting_compression_spz_2"})
     for (const Json& extensions :
          std::vector<Json>{{{name, view}},
                            {{"KHR_gaussian_splatting", {{"extensions", {{name, view}}}}}},
