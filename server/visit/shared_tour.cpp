@@ -49,7 +49,7 @@ void SharedTour::add(const std::shared_ptr<ClientConnection>& follower) {
       Lead{LeadState::leads, settings_.name, followers_.size(), {}, settings_.pings});
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
-  if (!positions_told_.places.empty())
+  if (!positions_told_.positions.empty())
     follower->connection().send(wire::serialize(positions_told_));
 }
 
