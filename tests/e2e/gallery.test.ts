@@ -147,7 +147,7 @@ const states: Readonly<Record<string, State>> = {
         ),
       );
     },
-    shown: button('Reload'),
+    shown: button('Dismiss'),
   },
   fly: mode(1, 'Fly'),
   walk: mode(2, 'Walk'),
