@@ -71,10 +71,14 @@ void copy_media(const std::filesystem::path& from_sidecar,
              from.string(), there);
 }
 
+/// Whether the output cannot have the coordinates of the input.
+bool loses_origin(const Conversion& conversion, const EditAboutOrigin& done) {
+  return done.origin != glm::dvec3(0.0) && !keeps_origin(conversion.options.out);
+}
+
 /// Whether places have other coordinates in the output than in the input.
 bool moves(const Conversion& conversion, const EditAboutOrigin& done) {
-  return conversion.edit.placement.moves() ||
-         (done.origin != glm::dvec3(0.0) && !keeps_origin(conversion.options.out));
+  return conversion.edit.placement.moves() || loses_origin(conversion, done);
 }
 
 /// Whether the output's sidecar would tell the view of the input, too.
@@ -247,7 +251,7 @@ void convert(const ConvertOptions& options, bool quiet) {
   if (!keeps_model(options.out, scene.cloud.model))
     fmt::print(stderr, "note: {} cannot tell its model; write \"model\": \"{}\" into {}\n",
                options.out, name_of(scene.cloud.model), sidecar_of(options.out).string());
-  if (moves)
+  if (loses_origin(conversion, about))
     fmt::print(stderr, "note: {} is about its origin: add [{}, {}, {}] to its coordinates\n",
                options.out, about.origin.x, about.origin.y, about.origin.z);
   write_hints_beside(scene.hints, conversion, about);

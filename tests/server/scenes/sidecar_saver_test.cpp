@@ -152,7 +152,7 @@ TEST_F(SidecarSaverTest, SavedPlacesAreThoseOfTheFile) {
   Saved saved = save(sent);
   run_until([&] { return is_ready(saved); });
   EXPECT_EQ(saved.get().status, 200);
-  const SceneFacts& facts = library_->in_memory(hall_)->facts;
+  const SceneFacts facts = entry()->facts;
   EXPECT_EQ(facts.start_pose.position, glm::vec3(0.5f, 0.0f, -4.0f));
   EXPECT_EQ(facts.focus, glm::vec3(0.25f, 0.0f, 0.0f));
   EXPECT_EQ(facts.origin, far->facts.origin);

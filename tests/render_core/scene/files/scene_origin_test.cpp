@@ -14,6 +14,7 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "render_core/scene/files/scene_parts.h"
+#include "render_core/scene/files/view_sample.h"
 #include "render_core/scene/formats/compressed_ply.h"
 #include "render_core/scene/formats/ksplat.h"
 #include "render_core/scene/tree/build_tree.h"
@@ -354,8 +355,8 @@ TEST_F(SceneOriginTest, HintFilesCountFromTheFilesZero) {
     files.cameras = folder_ / file;
     files.origin = scene.hints.origin;
     std::vector<std::string> notes;
-    const SceneHints found =
-        find_hints(scene.cloud, files, {}, notes, std::make_shared<ThreadPool>(1));
+    const SceneHints found = find_hints([&] { return view_sample(scene.cloud); }, files, {}, notes,
+                                        std::make_shared<ThreadPool>(1));
     EXPECT_LT(glm::distance(at(found, found.start_pose.position), eye), 1e-4) << file;
   }
 }
