@@ -1,13 +1,13 @@
 // Converts cameras and scenes between the client and the wire.
-import { add, dot, scale, sub, type Vec3 } from "../base/vector";
-import type { ClipPlane, Eye, Pose } from "../camera/eye";
-import { camera_modes, type CameraMode } from "../camera/mode";
-import type { Ray } from "../camera/ray";
-import type { SceneSetup } from "../camera/scene_setup";
-import type { FrameHeader, PoseInit, SceneFacts } from "../wire/wire";
+import { add, dot, scale, sub, type Vec3 } from '../base/vector';
+import type { ClipPlane, Eye, Pose } from '../camera/eye';
+import { camera_modes, type CameraMode } from '../camera/mode';
+import type { Ray } from '../camera/ray';
+import type { SceneSetup } from '../camera/scene_setup';
+import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
 
-type WireVector = Pick<NonNullable<SceneFacts["up"]>, "x" | "y" | "z">;
-type WirePose = NonNullable<FrameHeader["renderPose"]>;
+type WireVector = Pick<NonNullable<SceneFacts['up']>, 'x' | 'y' | 'z'>;
+type WirePose = NonNullable<FrameHeader['renderPose']>;
 
 export function pose_message(
   pose_id: number,

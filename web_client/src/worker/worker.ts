@@ -1,26 +1,26 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
-import { browser_timers, clock_from } from "../base/clock";
-import { refreshes } from "../base/patience";
-import type { CameraSample, Eye } from "../camera/eye";
-import type { PathSample } from "../camera/flight";
-import { FramePipeline } from "../decode/frame_pipeline";
-import { failures_per_rung, type DecoderRung } from "../decode/ladder";
-import { available_codecs, make_decoder, type MadeDecoder } from "../decode/make_decoder";
-import type { DecoderEvents } from "../decode/picture";
-import { Display } from "../present/display";
-import { make_presenter } from "../present/make_presenter";
-import { widened_fov } from "../present/warp";
-import { eye_of, pose_message, SceneCoordinates } from "../session/camera_messages";
-import type { Quality, View } from "../session/quality";
-import { Session } from "../session/session";
-import type { SessionState } from "../session/state";
-import { Metrics } from "../stats/metrics";
-import { endpoint_of, open_web_socket } from "../transport/socket";
-import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from "../wire/wire";
-import { aspect_of, frame_sizes } from "./frame_sizes";
-import type { FromWorker, ToWorker } from "./messages";
+import { browser_timers, clock_from } from '../base/clock';
+import { refreshes } from '../base/patience';
+import type { CameraSample, Eye } from '../camera/eye';
+import type { PathSample } from '../camera/flight';
+import { FramePipeline } from '../decode/frame_pipeline';
+import { failures_per_rung, type DecoderRung } from '../decode/ladder';
+import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make_decoder';
+import type { DecoderEvents } from '../decode/picture';
+import { Display } from '../present/display';
+import { make_presenter } from '../present/make_presenter';
+import { widened_fov } from '../present/warp';
+import { eye_of, pose_message, SceneCoordinates } from '../session/camera_messages';
+import type { Quality, View } from '../session/quality';
+import { Session } from '../session/session';
+import type { SessionState } from '../session/state';
+import { Metrics } from '../stats/metrics';
+import { endpoint_of, open_web_socket } from '../transport/socket';
+import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import { aspect_of, frame_sizes } from './frame_sizes';
+import type { FromWorker, ToWorker } from './messages';
 
-type Start = Extract<ToWorker, { kind: "start" }>;
+type Start = Extract<ToWorker, { kind: 'start' }>;
 
 const scope = self as unknown as {
   postMessage(message: FromWorker, transfer?: Transferable[]): void;
@@ -38,19 +38,19 @@ let client: Client | undefined;
 
 // The page sees uncaught exceptions as the worker's error event, but no rejections.
 scope.onunhandledrejection = ({ reason }) => {
-  say({ kind: "error", message: String(reason) });
+  say({ kind: 'error', message: String(reason) });
 };
 
 scope.onmessage = ({ data }) => {
-  if (data.kind !== "start") {
+  if (data.kind !== 'start') {
     client?.handle(data);
-    if (data.kind === "stop") client = undefined;
+    if (data.kind === 'stop') client = undefined;
     return;
   }
   try {
     client = new Client(data);
   } catch (error) {
-    say({ kind: "broken", message: String(error) });
+    say({ kind: 'broken', message: String(error) });
   }
 };
 
@@ -65,10 +65,10 @@ class Client {
   private view_: View;
   private quality_: Quality;
   private camera_: CameraSample | undefined;
-  private phase_: SessionState["phase"] = "connecting";
-  private host_ = ""; // the name of who presents
+  private phase_: SessionState['phase'] = 'connecting';
+  private host_ = ''; // the name of who presents
   private coordinates_ = new SceneCoordinates();
-  private first_rung_: DecoderRung = "prefer-hardware"; // where the present stream began
+  private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
 
   constructor(start: Start) {
@@ -77,7 +77,7 @@ class Client {
     this.quality_ = start.quality;
     this.rung_ = start.rung;
     this.presenter_ = make_presenter(start.canvas, start.presenter, () =>
-      this.session_.send({ case: "requestIdr", value: {} }),
+      this.session_.send({ case: 'requestIdr', value: {} }),
     );
     const environment = {
       now_us: () => this.clock_.now_us(),
@@ -88,88 +88,82 @@ class Client {
     this.tell_presenter();
     this.pipeline_ = this.make_pipeline();
     this.session_ = this.make_session(start);
-    if (start.watch) this.session_.keep({ case: "follow", value: { watch: start.watch } });
+    if (start.watch) this.session_.keep({ case: 'follow', value: { watch: start.watch } });
     this.session_.start();
   }
 
   handle(message: Exclude<ToWorker, Start>): void {
     switch (message.kind) {
-      case "camera":
+      case 'camera':
         this.take_camera({
           ...message.sample,
           eye: this.coordinates_.to_scene(message.sample.eye),
         });
         break;
-      case "view":
+      case 'view':
         this.resize(message);
         break;
-      case "warp":
+      case 'warp':
         this.display_.mode = message.mode;
         break;
-      case "path":
+      case 'path':
         this.send_path(message.samples);
         break;
-      case "reached":
-        this.session_.send({ case: "reached", value: { tour: message.tour, stop: message.stop } });
+      case 'reached':
+        this.session_.send({ case: 'reached', value: { tour: message.tour, stop: message.stop } });
         break;
-      case "pick":
-        this.session_.send({
-          case: "pick",
-          value: { id: message.id, ...this.coordinates_.ray_message(message.ray) },
-        });
+      case 'pick':
+        this.pick(message);
         break;
-      case "clip":
-        this.session_.keep({ case: "clip", value: this.coordinates_.clip_message(message.plane) });
+      case 'clip':
+        this.session_.keep({ case: 'clip', value: this.coordinates_.clip_message(message.plane) });
         break;
-      case "select":
+      case 'select':
         this.session_.select_scene(message.scene_id);
         break;
-      case "prepare":
-        this.session_.send({ case: "prepare", value: { sceneId: message.scene_id } });
+      case 'prepare':
+        this.session_.send({ case: 'prepare', value: { sceneId: message.scene_id } });
         break;
-      case "hidden":
+      case 'hidden':
         this.session_.set_paused(message.hidden);
         this.pipeline_.hidden = message.hidden;
         break;
-      case "retry":
+      case 'retry':
         this.session_.retry();
         break;
-      case "token":
+      case 'token':
         this.session_.greet_anew({ token: message.token });
         break;
-      case "watch":
-        this.session_.keep({ case: "follow", value: { watch: message.watch } });
+      case 'watch':
+        this.session_.keep({ case: 'follow', value: { watch: message.watch } });
         this.session_.greet_anew({ watch: message.watch, follow: true });
         break;
-      case "follow":
-        this.session_.keep({ case: "follow", value: { watch: message.watch } });
+      case 'follow':
+        this.session_.keep({ case: 'follow', value: { watch: message.watch } });
         break;
-      case "present":
+      case 'present':
         this.present(message);
         break;
-      case "ping":
-        this.session_.send({
-          case: "ping",
-          value: { place: this.coordinates_.point_message(message.point) },
-        });
+      case 'ping':
+        this.ping(message);
         break;
-      case "leave":
-      case "stop":
+      case 'leave':
+      case 'stop':
         this.session_.stop();
         break;
-      case "come_back":
-        if (this.phase_ !== "failed") this.session_.retry();
+      case 'come_back':
+        if (this.phase_ !== 'failed') this.session_.retry();
         break;
-      case "get_stats":
+      case 'get_stats':
         this.post_stats(message.request);
         break;
-      case "get_snapshot":
+      case 'get_snapshot':
         this.post_snapshot(message.request);
         break;
     }
   }
 
-  private resize({ view, quality }: Extract<ToWorker, { kind: "view" }>): void {
+  private resize({ view, quality }: Extract<ToWorker, { kind: 'view' }>): void {
     this.view_ = view;
     this.display_.aspect = aspect_of(view);
     this.quality_ = quality;
@@ -177,7 +171,7 @@ class Client {
   }
 
   private post_stats(request: number): void {
-    say({ kind: "stats", request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
+    say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
   }
 
   private present({
@@ -185,11 +179,11 @@ class Client {
     name,
     pings,
     tells_positions,
-  }: Extract<ToWorker, { kind: "present" }>): void {
+  }: Extract<ToWorker, { kind: 'present' }>): void {
     // The host's pictures and field of view are also those of participants, who see no warped view.
     this.display_.may_overscan = !on;
     this.session_.keep({
-      case: "present",
+      case: 'present',
       value: { on, name, pings, tellsPlaces: tells_positions },
     });
   }
@@ -200,6 +194,14 @@ class Client {
         pose_message(0, time_us, this.widened(this.coordinates_.to_scene(eye))),
       ),
     );
+  }
+
+  private ping({ point }: Extract<ToWorker, { kind: 'ping' }>): void {
+    this.session_.send({ case: 'ping', value: { place: this.coordinates_.point_message(point) } });
+  }
+
+  private pick({ id, ray }: Extract<ToWorker, { kind: 'pick' }>): void {
+    this.session_.send({ case: 'pick', value: { id, ...this.coordinates_.ray_message(ray) } });
   }
 
   private make_pipeline(): FramePipeline {
@@ -214,19 +216,19 @@ class Client {
           this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
       },
       {
-        ack: (ack) => this.session_.send({ case: "ack", value: ack }),
+        ack: (ack) => this.session_.send({ case: 'ack', value: ack }),
         presented: (frame, presented_us) => {
           this.shown_ = frame.header;
           this.metrics_.presented(frame, presented_us);
           say({
-            kind: "presented",
+            kind: 'presented',
             pose_id: Number(frame.header.poseId),
             pose: this.coordinates_.to_file(eye_of(frame.header.renderPose, 0)),
             fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan.y),
           });
         },
         dropped: () => this.metrics_.dropped(),
-        key_frame_wanted: () => this.session_.send({ case: "requestIdr", value: {} }),
+        key_frame_wanted: () => this.session_.send({ case: 'requestIdr', value: {} }),
         undecodable: (message) => this.fall_back(message),
       },
     );
@@ -243,16 +245,16 @@ class Client {
       {
         state: (state) => {
           this.phase_ = state.phase;
-          say({ kind: "state", state });
+          say({ kind: 'state', state });
         },
         welcome: (welcome) => {
           this.coordinates_ = new SceneCoordinates(welcome.scene);
-          say({ kind: "welcome", welcome });
+          say({ kind: 'welcome', welcome });
         },
         config: (config) => {
           this.metrics_.configured(config);
           this.pipeline_.configure(config);
-          say({ kind: "config", config });
+          say({ kind: 'config', config });
         },
         frame: (header, payload) => {
           this.metrics_.received(payload.length, this.clock_.now_us());
@@ -261,12 +263,12 @@ class Client {
         stream_ended: () => this.pipeline_.end_stream(),
         stats: (stats) => this.metrics_.server_said(stats),
         picked: ({ id, hit, distance, spread }) =>
-          say({ kind: "picked", id, hit: hit ? { distance, spread } : undefined }),
+          say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
         lead: (lead) => {
           this.host_ = lead.name;
           const { camera } = lead;
           say({
-            kind: "lead",
+            kind: 'lead',
             lead,
             eye:
               camera && this.coordinates_.to_file(eye_of(camera.worldFromCamera, camera.fovYRad)),
@@ -275,7 +277,7 @@ class Client {
         pinged: ({ place, byLeader }) => {
           if (place)
             say({
-              kind: "pinged",
+              kind: 'pinged',
               point: this.coordinates_.point_of(place),
               by_host: byLeader,
               name: this.host_,
@@ -283,11 +285,11 @@ class Client {
         },
         participants: ({ places }) =>
           say({
-            kind: "participants_moved",
+            kind: 'participants_moved',
             positions: places.map(this.coordinates_.point_of),
           }),
-        notice: (message) => say({ kind: "notice", message }),
-        stayed: (message) => say({ kind: "stayed", message }),
+        notice: (message) => say({ kind: 'notice', message }),
+        stayed: (message) => say({ kind: 'stayed', message }),
       },
       {
         sceneId: start.scene_id,
@@ -296,7 +298,7 @@ class Client {
         decoders: available_codecs(start.rung),
         token: start.token,
         watch: start.watch,
-        follow: start.watch !== "",
+        follow: start.watch !== '',
         device: start.device,
         settings: this.frame_sizes(),
       },
@@ -336,7 +338,7 @@ class Client {
 
   private tell_presenter(): void {
     const { warps, overscan, warp_state } = this.display_;
-    say({ kind: "presenter", presenter: this.presenter_.kind, warp: warp_state, warps, overscan });
+    say({ kind: 'presenter', presenter: this.presenter_.kind, warp: warp_state, warps, overscan });
   }
 
   /** Decoders that failed are not tried again. The next stream begins with the one that worked. */
@@ -344,7 +346,7 @@ class Client {
     config: StreamConfig,
     failures: number,
     events: DecoderEvents,
-  ): Promise<MadeDecoder["decoder"] | undefined> {
+  ): Promise<MadeDecoder['decoder'] | undefined> {
     if (failures === 0) this.first_rung_ = this.rung_;
     const now_us = (): number => this.clock_.now_us();
     const made = await make_decoder(
@@ -362,12 +364,12 @@ class Client {
 
   private settle_on(rung: DecoderRung): void {
     this.rung_ = rung;
-    say({ kind: "rung", rung });
+    say({ kind: 'rung', rung });
   }
 
   private fall_back(message: string): void {
-    say({ kind: "fallback", message });
-    this.settle_on("jpeg");
+    say({ kind: 'fallback', message });
+    this.settle_on('jpeg');
     this.session_.greet_anew({ decoders: [Codec.MJPEG] });
   }
 
@@ -376,7 +378,7 @@ class Client {
     try {
       picture = this.shown_ && this.display_.read();
     } catch (error) {
-      console.warn("the picture cannot be read", error);
+      console.warn('the picture cannot be read', error);
     }
     const snapshot = this.shown_ &&
       picture && {
@@ -384,6 +386,6 @@ class Client {
         ...picture,
         view: this.coordinates_.to_file(picture.view),
       };
-    say({ kind: "snapshot", request, snapshot }, picture && [picture.rgba.buffer]);
+    say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
   }
 }
