@@ -9,6 +9,7 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/frame/renderer.h"
+#include "tests/support/picked.h"
 #include "tests/support/rendered.h"
 #include "tests/support/surfels.h"
 #include "tests/support/test_scenes.h"
@@ -66,7 +67,8 @@ class Surfels : public ::testing::TestWithParam<SurfelView> {};
 
 // Our flat Gaussians are an approximation. render_core/FRAMES.md has these figures.
 TEST_P(Surfels, AsFlatGaussiansAreNearThoseThatRaysMeet) {
-  const GaussianCloud cloud = test::surfel_room();
+  ThreadPool pool(1);
+  const GaussianCloud cloud = test::in_cluster_order(test::surfel_room(), pool);
   FrameRequest request;
   request.camera =
       make_camera(test::look_at(GetParam().from, GetParam().to), size_px, focal_px, 0.1f);
