@@ -67,8 +67,16 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
   if (options.first_view || tell_anything(hints))
     scene.hints = find_hints(
         [&] {
-          auto sample = view_sample(location, scene.cloud.model, hints.origin, LoadContext(*pool));
-          return sample ? *std::move(sample) : view_sample(scene.cloud);
+          // Levels that are not loaded may be missing. What is loaded can be seen all the same.
+          try {
+            const LoadContext reading(*pool);
+            if (auto levels = view_sample(location, scene.cloud.model, hints.origin, reading))
+              return *std::move(levels);
+          } catch (const InputError& error) {
+            scene.notes.push_back(
+                fmt::format("its first view is that of what is loaded: {}", error.what()));
+          }
+          return view_sample(scene.cloud);
         },
         hints, options.up, scene.notes, pool, options.keep_view);
   scene.hints.origin = hints.origin;

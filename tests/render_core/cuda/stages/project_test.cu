@@ -35,10 +35,11 @@ TEST_P(ProjectStage, SplatsAreThoseOfTheCpuCore) {
   const auto paths = sweeps ? fetch(m.path.get(), counts.visible) : std::vector<SplatPath>();
 
   // What packing rounds: shapes to 2^-15 of the largest entry of their factor, which a needle's
-  // width feels thirty times, harmonics to 8 bits, colours to halves.
+  // width feels thirty times, harmonics to 8 bits, colours to halves, opacities beside harmonics to
+  // 12 bits.
   Difference place("project: centre, share of 1 px and its hundredth part off the middle", 1e-3);
   Difference shape("project: whitening, share of its entries' sum", 5e-3);
-  Difference opacity("project: log2 of opacity", 1e-4), colour("project: colour", 0.02);
+  Difference opacity("project: log2 of opacity", 2e-3), colour("project: colour", 0.02);
   Difference path("project: path, share of 1 px and its length", 5e-3);
   Difference depth("project: depth keys, steps", 1.05);  // keys are rounded down
   const auto on_cpu = lists.on_cpu();

@@ -115,6 +115,15 @@ TEST_F(ScenePartsTest, TheFirstViewIsTheSameWhateverIsLoaded) {
   EXPECT_GT(paged.up.z, 0.999f);
 }
 
+TEST_F(ScenePartsTest, AMissingLevelKeepsNoOtherFromBeingSeen) {
+  const GaussianCloud whole = flat(20000);
+  const std::filesystem::path folder = write_streamed_sog({{whole}, {coarser(whole, 4)}});
+  std::filesystem::remove_all(folder / "0_0");
+  const Scene scene = load_scene(folder, chosen(1));
+  EXPECT_GT(scene.hints.up.z, 0.99f);
+  EXPECT_THAT(scene.notes, ::testing::ElementsAre(::testing::HasSubstr("0_0")));
+}
+
 TEST_F(ScenePartsTest, AFileInPartsHasTheFirstViewOfTheLoadedScene) {
   const auto path = write("a.ply", ply_bytes(hall(70000)));
   const auto parted = scene_in_parts(locate_scene(path), {}, pool_, 9999);
