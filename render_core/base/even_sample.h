@@ -9,7 +9,7 @@ namespace catgs {
 /// Files are often ordered row by row, so that every n-th thing may lie on one line.
 class EvenSample {
  public:
-  /// Of `size` things at most `most`.
+  /// Takes at most `most` of `size` things.
   EvenSample(std::uint64_t size, std::uint64_t most)
       : step_(std::max<std::uint64_t>(1, (size + most - 1) / most)),
         count_((size + step_ - 1) / step_) {}

@@ -39,7 +39,7 @@ static_assert(sizeof(PackedGeometry) == 32);
 /// The units of the numbers in a cluster's records.
 struct alignas(16) PackedUnits {
   float factor;  // of the cluster's largest Gaussian, a power of two
-  // Of the harmonics of degree 1, 2 and 3: the largest one of the median Gaussian is 127 / 2^15. So
+  // For the harmonics of degree 1, 2 and 3: the largest of the median Gaussian is 127 / 2^15. So
   // no Gaussian's extremes decide how finely the others are stored.
   float sh[3];
 };

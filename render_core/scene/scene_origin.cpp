@@ -26,7 +26,7 @@ glm::dvec3 find_origin(std::span<const glm::vec3> places) {
     medians[axis] = static_cast<double>(*middle);
   }
   if (origin_near(medians) == glm::dvec3(0.0)) return glm::dvec3(0.0);
-  // Of two equal parts far apart, the medians may take one axis each.
+  // The medians may take one axis each of two equal parts far apart.
   return origin_near(*std::ranges::min_element(
       sample, {}, [&](const glm::vec3& p) { return glm::distance(glm::dvec3(p), medians); }));
 }

@@ -14,7 +14,7 @@ void check_can_be_saved(const std::filesystem::path& path);
 /// Whether a file of this name can tell the model.
 bool keeps_model(const std::filesystem::path& path, SplatModel model);
 
-/// What a file of this name would not hold of the cloud, for people. Throws InputError as
+/// Says what a file of this name would not hold of the cloud, for people. Throws InputError as
 /// save_scene() does.
 std::vector<std::string> losses_of(const GaussianCloud& cloud, const std::filesystem::path& path);
 

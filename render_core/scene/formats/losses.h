@@ -14,7 +14,7 @@
 
 namespace catgs {
 
-/// What a file of a format would not hold of a cloud, for people: see SceneFormat::losses.
+/// Collects what a file of a format would not hold of a cloud, for people: see SceneFormat::losses.
 class Losses {
  public:
   explicit Losses(const GaussianCloud& cloud) : cloud_(cloud) {}

@@ -132,7 +132,7 @@ struct SceneFormat {
   /// Writes a cloud that is about `origin`.
   void (*write)(const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool& pool,
                 std::ostream& to) = nullptr;
-  /// What a written file would not hold of the cloud, for people. Throws InputError where that is
+  /// Says what a written file would not hold of the cloud, for people. Throws InputError where that is
   /// too much, as `write` does.
   std::vector<std::string> (*losses)(const GaussianCloud& cloud) = nullptr;
 };
