@@ -132,8 +132,8 @@ struct SceneFormat {
   /// Writes a cloud that is about `origin`.
   void (*write)(const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool& pool,
                 std::ostream& to) = nullptr;
-  /// Says what a written file would not hold of the cloud, for people. Throws InputError where that is
-  /// too much, as `write` does.
+  /// Says what a written file would not hold of the cloud, for people. Throws InputError where that
+  /// is too much, as `write` does.
   std::vector<std::string> (*losses)(const GaussianCloud& cloud) = nullptr;
 };
 
