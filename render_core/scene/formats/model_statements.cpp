@@ -68,12 +68,12 @@ std::optional<SplatModel> model_of(std::string_view value, bool as_flag) {
 /// The model of "[word] key [type] value"; nothing for other texts.
 std::optional<SplatModel> model_stated(const std::vector<std::string>& words) {
   constexpr std::array<std::string_view, 5> types = {"int64", "int", "bool", "str", "double"};
-  const auto key = std::ranges::find_if(words, is_key);
-  if (key == words.end() || key - words.begin() > 1) return std::nullopt;
-  auto value = key + 1;
-  if (words.end() - value == 2 && is_one_of(*value, types)) ++value;
-  if (words.end() - value != 1) return std::nullopt;
-  return model_of(*value, is_about_antialiasing(*key));
+  const auto key = static_cast<std::size_t>(std::ranges::find_if(words, is_key) - words.begin());
+  if (key > 1 || key >= words.size()) return std::nullopt;
+  std::size_t value = key + 1;
+  if (value + 2 == words.size() && is_one_of(words[value], types)) ++value;
+  if (value + 1 != words.size()) return std::nullopt;
+  return model_of(words[value], is_about_antialiasing(words[key]));
 }
 
 void add_unclear(std::vector<std::string>& notes, std::string_view text) {

@@ -58,7 +58,8 @@ double rms_of(const VectorTable& vectors, const Indices& members) {
   std::vector<double> squares(taken);
   for (std::size_t i = 0; i < taken; ++i) {
     const float* vector = vectors[members[i * members.size() / taken]];
-    for (std::size_t d = 0; d < vectors.dims; ++d) squares[i] += double{vector[d]} * vector[d];
+    for (std::size_t d = 0; d < vectors.dims; ++d)
+      squares[i] += std::pow(static_cast<double>(vector[d]), 2);
   }
   std::ranges::sort(squares);
   const auto mean = [&](std::size_t count) {

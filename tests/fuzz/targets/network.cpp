@@ -173,8 +173,18 @@ std::map<std::string, std::string> client_message_seeds() {
 
 /// Whether a Host header is one of a loopback address or of friend.example, whatever its port.
 bool means_this_machine(const std::string& host) {
-  static const std::regex ours(R"((friend\.example|localhost|127\.[0-9.]+|\[[01:.]+\])(:[0-9]*)?)");
+  static const std::regex ours(R"((friend\.example|localhost|127\.[0-9.]+|\[[01:.]+\])(:[0-9]*)?)",
+                               std::regex::icase);
   return host.empty() || std::regex_match(host, ours);
+}
+
+/// Without what browsers do not tell apart: capitals, and the usual ports.
+std::string authority(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  for (const std::string_view port : {":443", ":80"})
+    if (text.ends_with(port)) text.resize(text.size() - port.size());
+  return text;
 }
 
 /// What an upload asks of what is there.
@@ -231,7 +241,8 @@ void parse_request(Bytes input) {
     require(path == "/" || path == "/index.html" || path == "/assets/a.js", "three names");
 
   if (origin_allowed(origin, host, {"https://friend.example"}) && !origin.empty())
-    require(origin == "https://friend.example" || (!host.empty() && origin.ends_with(host)),
+    require(origin == "https://friend.example" ||
+                (!authority(host).empty() && authority(origin).ends_with(authority(host))),
             "an origin is listed or this host");
   require(
       means_this_machine(host) || !host_allowed(host, Names::loopback, {"https://friend.example"}),
