@@ -5,17 +5,18 @@
 
 #include <glm/geometric.hpp>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/math/camera.h"
 
 namespace catgs {
 
 glm::dvec3 find_origin(std::span<const glm::vec3> places) {
-  const std::size_t step =
-      std::max<std::size_t>(1, (places.size() + most_origin_places - 1) / most_origin_places);
+  const EvenSample even(places.size(), most_origin_places);
   std::vector<glm::vec3> sample;
-  for (std::size_t i = 0; i < places.size(); i += step)  // NaN is not within
-    if (glm::all(glm::lessThanEqual(glm::abs(places[i]), glm::vec3(max_coordinate))))
-      sample.push_back(places[i]);
+  for (std::size_t k = 0; k < even.size(); ++k)  // NaN is not within
+    if (const glm::vec3& place = places[even[k]];
+        glm::all(glm::lessThanEqual(glm::abs(place), glm::vec3(max_coordinate))))
+      sample.push_back(place);
   if (sample.empty()) return glm::dvec3(0.0);
   glm::dvec3 medians;
   std::vector<float> values(sample.size());

@@ -56,7 +56,7 @@ struct LensOptions {
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
 
-/// What the options leave open is taken from `lens`, as far as that is known. Without --near the
+/// `lens` gives what the options leave open, as far as it is known. Without --near the
 /// near plane is `hinted_near_z`. Throws InputError.
 Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& lens = {});
 

@@ -19,7 +19,7 @@ namespace catgs {
 std::string derived_name(const SceneLocation& scene, const std::string& facts,
                          std::string_view extension);
 /// The facts that change with the scene's files (path, number, sizes, newest time) and its model.
-/// Of sidecars nothing else counts. Reads the names, sizes and times of the files. Throws
+/// Nothing else of sidecars counts. Reads the names, sizes and times of the files. Throws
 /// InputError.
 std::string content_facts(const SceneLocation& scene);
 /// That of a scene's tree. It changes with content_facts(), with the levels that are chosen of the

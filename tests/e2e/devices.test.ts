@@ -1,4 +1,4 @@
-// What real devices and browsers do to a page: keep it, end its decoders and its GPU, run foreign scripts in it.
+// Real devices and browsers do this to a page: keep it, end its decoders and its GPU, run foreign scripts in it.
 import { readFileSync } from 'node:fs';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';

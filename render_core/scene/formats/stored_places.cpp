@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 
 #include "render_core/scene/formats/calm_range.h"
+#include "render_core/scene/formats/losses.h"
 
 namespace catgs {
 namespace {
@@ -16,10 +17,6 @@ constexpr float widest_gap = 0.5f;  // of the others' range
 constexpr float least_steps = 256.0f;
 constexpr std::size_t most_sampled = 4096;
 constexpr float least_scale = 1e-10f;  // as in sanitize()
-
-float middle_of(const glm::vec3& v) {
-  return std::max(std::min(v.x, v.y), std::min(std::max(v.x, v.y), v.z));
-}
 
 }  // namespace
 
@@ -66,7 +63,7 @@ StoredPlaces::Range StoredPlaces::range_of_most(int axis, float (*stored)(float)
   std::vector<float> sizes(std::min(count, most_sampled));
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const std::size_t of = i * count / sizes.size();
-    sizes[i] = stored(at[of] + middle_of(scale_[of])) - stored(at[of]);
+    sizes[i] = stored(at[of] + middle_scale(scale_[of])) - stored(at[of]);
   }
   const auto median = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::ranges::nth_element(sizes, median);

@@ -23,7 +23,7 @@ struct CutEye {
         forward(camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f)),
         focal_px(std::max(camera.focal_px.x, camera.focal_px.y)),
         near_z(camera.near_z) {
-    // Of the corner that is farthest from the axis, as far out as projections are exact.
+    // The corner farthest from the axis decides, as far out as projections are exact.
     const glm::vec2 centre = camera.principal_point_px, size(camera.size_px);
     const glm::vec2 slope = static_cast<float>(fov_clamp) *
                             glm::max(glm::abs(centre), glm::abs(size - centre)) /

@@ -24,10 +24,10 @@ namespace {
 using Factor = math::CovarianceFactor<double>;
 
 constexpr int most_members = 2 * static_cast<int>(cluster_size);
-/// Of a covariance. Moments of a closed surface make Gaussians that are too small to close it, and
-/// the sum of areas that hide each other is too large. On playbot, in a pool for a third of it, a
-/// picture has 33.5 dB without growth, and 34.5, 34.2 dB with at most 1.5, 1.8; on a city of
-/// 400,000 in a pool for a quarter 17.9, 22.5, 22.3 dB.
+/// Bounds how a covariance grows. Moments of a closed surface make Gaussians that are too small to
+/// close it, and the sum of areas that hide each other is too large. On playbot, in a pool for a
+/// third of it, a picture has 33.5 dB without growth, and 34.5, 34.2 dB with at most 1.5, 1.8; on a
+/// city of 400,000 in a pool for a quarter 17.9, 22.5, 22.3 dB.
 constexpr double most_grown = 1.5;
 constexpr float too_far = 1e18f;  // for any partner, in mean sizes
 

@@ -31,7 +31,7 @@ struct TreeScene {
 };
 TreeScene read_tree(std::unique_ptr<const ByteSource> file, const LoadContext& context);
 
-/// Of an outline, at most.
+/// An outline has so many at most.
 inline constexpr std::uint64_t outline_gaussians = 1'000'000;
 
 /// The same for the finest level with at most `most_gaussians` that ends a page, or that of the
