@@ -34,8 +34,8 @@ inline void find_limits(const LimitTask& task) {
   const auto deepest_end = [&](const Floats& x_px, const Floats& y_px) HWY_ATTR {
     const Floats x = floor(x_px * per_px), y = floor(y_px * per_px);
     const auto inside = (x >= zero) & (y >= zero) & (x < columns) & (y < rows);
-    const Floats place = select(inside, mul_add(y, stride, x), zero);
-    return select(inside, gather(task.deepest, to_ints(place)), unknown);
+    const Floats position = select(inside, mul_add(y, stride, x), zero);
+    return select(inside, gather(task.deepest, to_ints(position)), unknown);
   };
   const Floats middle_y((static_cast<float>(task.row) + 0.5f) * part_side_px);
   for (int x = 0; x < task.parts.x; x += static_cast<int>(Floats::count)) {

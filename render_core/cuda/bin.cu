@@ -16,7 +16,7 @@ constexpr std::uint32_t most_splats = list_window + 1;
 /// List entries while they are made: their tile's row << 16 | column, and their splat's slot.
 struct Window {
   std::uint32_t begin, end;  // list entries
-  std::uint32_t place[list_window];
+  std::uint32_t position[list_window];
   std::uint32_t slot[list_window];
 
   /// Writes a row's entries from `at` on, as far as they are before `last` and in the window.
@@ -26,7 +26,7 @@ struct Window {
     const std::uint32_t stop = min(last, end);
     for (int column = columns.x; column <= columns.y; ++column, ++at) {
       if (at < begin || at >= stop) continue;
-      place[at - begin] = static_cast<std::uint32_t>(row << 16 | column);
+      position[at - begin] = static_cast<std::uint32_t>(row << 16 | column);
       slot[at - begin] = splat;
     }
     return at;
@@ -140,7 +140,7 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
     if (thread % warp_size == 0)
       splats[thread / warp_size] = thread < warp_size ? max(beyond, 1u) - 1 : beyond;
   }
-  for (std::uint32_t j = thread; j < list_window; j += block_size) window.place[j] = nowhere;
+  for (std::uint32_t j = thread; j < list_window; j += block_size) window.position[j] = nowhere;
   const std::uint32_t counted = p.in_window != nullptr ? p.shape.tiles() : 0;
   for (std::uint32_t t = thread; t < counted; t += block_size) in_tile[t] = 0;
   if (thread == 0) {
@@ -172,10 +172,11 @@ __global__ void __launch_bounds__(block_size) emit_kernel(const EmitParams<Tile>
   }
   __syncthreads();
   for (std::uint32_t at = begin + thread; at < end; at += block_size) {
-    const std::uint32_t place = window.place[at - begin], slot = window.slot[at - begin];
+    const std::uint32_t position = window.position[at - begin], slot = window.slot[at - begin];
     std::uint32_t tile = p.shape.tiles(), blocks = 0;
-    if (place != nowhere) {
-      const int column = static_cast<int>(place & 0xffffu), row = static_cast<int>(place >> 16);
+    if (position != nowhere) {
+      const int column = static_cast<int>(position & 0xffffu),
+                row = static_cast<int>(position >> 16);
       tile = static_cast<std::uint32_t>(row * p.shape.tiles_x + column);
       blocks = blocks_of_entry(p, column, row, tile, slot);
     }

@@ -30,7 +30,7 @@ static_assert(hit_room >= group_splats + scan_entries);
 struct __align__(16) WarpScratch {
   StagedHalf staged[halves];  // splats that wait for the halves of its part
   // A column for each lane.
-  PixelPlaces places[halves][warp_size];
+  PixelPositions positions[halves][warp_size];
   float4 fetched[2][lane_splats][2][warp_size];  // records of this group and the next
   std::uint32_t hits[hit_room];  // list entries that reach live halves and wait to be fetched
 };
@@ -206,9 +206,9 @@ __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Grou
 #pragma unroll
     for (unsigned i = 0; i < lane_splats; ++i) {
       const unsigned lanes = hits[i][half];
-      const unsigned place =
+      const unsigned position =
           waiting[half].first + waiting[half].count + __popc(lanes & lanes_before);
-      scratch.staged[half].put_if((lanes & (lanes_before + 1u)) != 0, StagedHalf::wrapped(place),
+      scratch.staged[half].put_if((lanes & (lanes_before + 1u)) != 0, StagedHalf::wrapped(position),
                                   splat[i]);
       waiting[half].count += __popc(lanes);
     }
@@ -218,23 +218,24 @@ __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Grou
 
 /// Pads the halves' rounds with splats that contribute nothing.
 __device__ void fill_up(WarpScratch& scratch, const Waiting (&waiting)[halves]) {
-  const unsigned place = threadIdx.x % warp_size;
+  const unsigned position = threadIdx.x % warp_size;
 #pragma unroll
   for (int half = 0; half < halves; ++half) {
-    if (place >= waiting[half].count)
-      *reinterpret_cast<uint2*>(scratch.staged[half].at(
-          StagedHalf::wrapped(waiting[half].first + place), 0)) = split_pair(least_exponent, 0.0f);
+    if (position >= waiting[half].count)
+      *reinterpret_cast<uint2*>(
+          scratch.staged[half].at(StagedHalf::wrapped(waiting[half].first + position), 0)) =
+          split_pair(least_exponent, 0.0f);
   }
   __syncwarp();
 }
 
 /// The largest transmittance that earlier slices of the task's tile leave in this part, as far as
 /// they are known to be finished.
-__device__ float transmittance_before(const BlendParams& p, std::uint32_t slice, int place,
+__device__ float transmittance_before(const BlendParams& p, std::uint32_t slice, int position,
                                       int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
   float product = 1.0f;
-  for (int back = 1 + lane; back <= place; back += warp_size) {
+  for (int back = 1 + lane; back <= position; back += warp_size) {
     const volatile float* known = p.slice_transmittance;
     product *= known[slice_part(slice - back, part)];
   }
@@ -261,8 +262,8 @@ __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t
       p.slice_pixels[slice_pixel(slice, pixels.in_tile(i))] =
           make_float4(c.x, c.y, c.z, states[i].transmittance);
     } else {
-      const int2 place = pixels.place(i);
-      show_pixel(p.rgb, p.shape, place.x, place.y, states[i], p.background, p.finish);
+      const int2 position = pixels.position(i);
+      show_pixel(p.rgb, p.shape, position.x, position.y, states[i], p.background, p.finish);
     }
   }
 }
@@ -324,9 +325,9 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   const std::uint32_t first_block = first_block_of(part);
   std::uint32_t live[halves] = {first_block, first_block << blocks_across};
   Groups groups(p, task, live[0] | live[1], scratch);
-  PixelPlaces(&places)[halves][warp_size] = scratch.places;
-  HalfPixels half[halves] = {take_half(pixels, p.shape, 0, places[0][lane]),
-                             take_half(pixels, p.shape, 1, places[1][lane])};
+  PixelPositions(&positions)[halves][warp_size] = scratch.positions;
+  HalfPixels half[halves] = {take_half(pixels, p.shape, 0, positions[0][lane]),
+                             take_half(pixels, p.shape, 1, positions[1][lane])};
 #pragma unroll
   for (int h = 0; h < halves; ++h)
     if (!half[h].live(least)) live[h] = 0;
@@ -343,7 +344,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
 #pragma unroll
     for (int h = 0; h < halves; ++h) {
       while (live[h] != 0 && waiting[h].count >= enough) {
-        pairs += blend_round<count_pairs>(half[h], places[h][lane], scratch.staged[h],
+        pairs += blend_round<count_pairs>(half[h], positions[h][lane], scratch.staged[h],
                                           waiting[h].first, least);
         waiting[h].first = StagedHalf::wrapped(waiting[h].first + round_splats);
         waiting[h].count -= min(waiting[h].count, unsigned{round_splats});
@@ -392,15 +393,15 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
     std::uint32_t work = 0;
     if (lane == 0) work = atomicAdd(&p.counts->next_part, 1u);
     work = __shfl_sync(~0u, work, 0);
-    std::uint32_t place = work / parts_per_tile;
+    std::uint32_t position = work / parts_per_tile;
     int queue_class = 0;
     for (; queue_class < queue_classes; ++queue_class) {
       const std::uint32_t queued = p.counts->queued[queue_class];
-      if (place < queued) break;
-      place -= queued;
+      if (position < queued) break;
+      position -= queued;
     }
     if (queue_class == queue_classes) return;
-    const std::uint32_t task = p.queue[queue_class * p.shape.tiles() + place];
+    const std::uint32_t task = p.queue[queue_class * p.shape.tiles() + position];
     blend_part<count_pairs>(p, scratch[warp], task, static_cast<int>(work % parts_per_tile));
     __syncwarp();
   }

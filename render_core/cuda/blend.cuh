@@ -46,7 +46,7 @@ __device__ inline int2 part_corner_px(const FrameShape& shape, std::uint32_t til
 }
 
 /// The place in an array [tiles][parts_per_tile] of the part in this column and row of all parts.
-__device__ inline std::uint32_t part_place(const FrameShape& shape, int column, int row) {
+__device__ inline std::uint32_t part_position(const FrameShape& shape, int column, int row) {
   const int tile = row / parts_across * shape.tiles_x + column / parts_across;
   const int in_tile = row % parts_across * parts_across + column % parts_across;
   return static_cast<std::uint32_t>(tile * parts_per_tile + in_tile);

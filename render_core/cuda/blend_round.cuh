@@ -76,24 +76,26 @@ class StagedHalf {
   static constexpr unsigned gap = 2;  // after each quarter
 
   /// Requires place < 2 room.
-  __device__ static unsigned wrapped(unsigned place) { return place < room ? place : place - room; }
+  __device__ static unsigned wrapped(unsigned position) {
+    return position < room ? position : position - room;
+  }
 
   /// Address of pairs 2 k and 2 k + 1 of a splat.
-  __device__ uint4* at(unsigned place, unsigned k) {
-    return &words_[k][place + place / quarter * gap];
+  __device__ uint4* at(unsigned position, unsigned k) {
+    return &words_[k][position + position / quarter * gap];
   }
-  __device__ const uint4* at(unsigned place, unsigned k) const {
-    return &words_[k][place + place / quarter * gap];
+  __device__ const uint4* at(unsigned position, unsigned k) const {
+    return &words_[k][position + position / quarter * gap];
   }
   /// A predicate is cheaper than a branch.
-  __device__ void put_if(bool wanted, unsigned place, const StagedSplat& splat) {
+  __device__ void put_if(bool wanted, unsigned position, const StagedSplat& splat) {
     const uint2(&p)[round_lanes] = splat.pair;
     asm volatile(
         "{.reg .pred wanted;"
         " setp.ne.u32 wanted, %0, 0;"
         " @wanted st.shared.v4.u32 [%1], {%2, %3, %4, %5};"
         " @wanted st.shared.v4.u32 [%1 + %10], {%6, %7, %8, %9};}" ::"r"(unsigned{wanted}),
-        "r"(static_cast<std::uint32_t>(__cvta_generic_to_shared(at(place, 0)))), "r"(p[0].x),
+        "r"(static_cast<std::uint32_t>(__cvta_generic_to_shared(at(position, 0)))), "r"(p[0].x),
         "r"(p[0].y), "r"(p[1].x), "r"(p[1].y), "r"(p[2].x), "r"(p[2].y), "r"(p[3].x), "r"(p[3].y),
         "n"(sizeof(words_[0]))
         : "memory");
@@ -149,7 +151,7 @@ struct BlockPixels {
 
 /// The first factors of the first product: the lane's pair out of (1, x), (y, x^2), (xy, y^2), 0,
 /// for its two pixels of each block.
-struct PixelPlaces {
+struct PixelPositions {
   std::uint32_t of[half_blocks][2];
 };
 
@@ -168,7 +170,7 @@ struct HalfPixels {
 
 /// Initialises half part `half` from the warp's pixels, and sets the places of the lane's pixels.
 __device__ inline HalfPixels take_half(const PartPixels& pixels, const FrameShape& shape, int half,
-                                       PixelPlaces& places) {
+                                       PixelPositions& positions) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size, pair = lane % round_lanes;
   HalfPixels taken;
 #pragma unroll
@@ -181,7 +183,7 @@ __device__ inline HalfPixels take_half(const PartPixels& pixels, const FrameShap
       const float x = pixel.x, y = pixel.y;
       const float first = pair == 0 ? 1.0f : pair == 1 ? y : pair == 2 ? x * y : 0.0f;
       const float second = pair == 0 ? x : pair == 1 ? x * x : pair == 2 ? y * y : 0.0f;
-      places.of[b][row] = bits_of(__floats2half2_rn(first, second));
+      positions.of[b][row] = bits_of(__floats2half2_rn(first, second));
       taken.block[b].transmittance[row] = pixel.inside ? 1.0f : 0.0f;
     }
 #pragma unroll
@@ -199,15 +201,16 @@ struct QuarterBlend {
 /// `in_column`: the lane's pair of coefficients, of the splat in the lane's column of the first
 /// product.
 template <bool count_pairs>
-__device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint32_t (&places)[2],
-                                      const uint2* in_column, float least, unsigned& pairs) {
+__device__ QuarterBlend blend_quarter(const BlockPixels& pixels,
+                                      const std::uint32_t (&positions)[2], const uint2* in_column,
+                                      float least, unsigned& pairs) {
   QuarterBlend blend{{alpha_scale, alpha_scale}, {}};
 #pragma unroll
   for (int j = 0; j < columns; ++j) {
     const uint2 field = in_column[2 * j * (sizeof(uint4) / sizeof(uint2))];
     float exponent[4] = {};
-    multiply_add(exponent, places, field.y);
-    multiply_add(exponent, places, field.x);
+    multiply_add(exponent, positions, field.y);
+    multiply_add(exponent, positions, field.x);
 #pragma unroll
     for (int row = 0; row < 2; ++row) {
       float weight[2];
@@ -228,7 +231,7 @@ __device__ QuarterBlend blend_quarter(const BlockPixels& pixels, const std::uint
 /// transmittance is `least` or more. Returns the number of pairs that the lane blended if
 /// `count_pairs`.
 template <bool count_pairs>
-__device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
+__device__ unsigned blend_round(HalfPixels& pixels, const PixelPositions& positions,
                                 const StagedHalf& staged, unsigned first, float least) {
   const unsigned lane = threadIdx.x % warp_size;
   // Columns 2 l and 2 l + 1 of the first product are two neighbours in the quarter of lane l.
@@ -240,7 +243,7 @@ __device__ unsigned blend_round(HalfPixels& pixels, const PixelPlaces& places,
   QuarterBlend mine[half_blocks];
 #pragma unroll
   for (int b = 0; b < half_blocks; ++b)
-    mine[b] = blend_quarter<count_pairs>(pixels.block[b], places.of[b], in_column, least, pairs);
+    mine[b] = blend_quarter<count_pairs>(pixels.block[b], positions.of[b], in_column, least, pairs);
   // Row r of a matrix of colours belongs to the splat in column r of the first product.
   const unsigned row_of_matrix = lane % column_splats, matrix = lane / column_splats;
   uint2 colours[chunks];

@@ -19,7 +19,7 @@ __device__ float deepest_end(const OcclusionParams& p, float x_px, float y_px) {
     for (int dx = -p.radius; dx <= p.radius; ++dx) {
       const int at_x = static_cast<int>(x) + dx, at_y = static_cast<int>(y) + dy;
       if (at_x < 0 || at_y < 0 || at_x >= parts_x || at_y >= parts_y) continue;
-      deepest = fmaxf(deepest, p.last_ends[part_place(p.shape, at_x, at_y)]);
+      deepest = fmaxf(deepest, p.last_ends[part_position(p.shape, at_x, at_y)]);
     }
   }
   return deepest;

@@ -41,7 +41,7 @@ __device__ inline bool Occlusion::hides(const FrameShape& shape, float2 low_px, 
   if (parts_x <= most_parts && parts_y <= most_parts) {
     for (int y = top / part_side_px; y <= bottom / part_side_px; ++y) {
       for (int x = left / part_side_px; x <= right / part_side_px; ++x) {
-        if (!(depth > part[part_place(shape, x, y)])) return false;
+        if (!(depth > part[part_position(shape, x, y)])) return false;
       }
     }
     return true;

@@ -48,8 +48,8 @@ std::vector<PageEntry> entries_of(const PageTable& table) {
   std::vector<const PageInSlot*> pages;
   for (const auto& page : table.pages()) pages.push_back(page.get());
   std::ranges::sort(pages, {}, &PageInSlot::page);
-  std::unordered_map<std::uint64_t, std::size_t> place_of;
-  for (std::size_t i = 0; i < pages.size(); ++i) place_of[pages[i]->page] = i;
+  std::unordered_map<std::uint64_t, std::size_t> position_of;
+  for (std::size_t i = 0; i < pages.size(); ++i) position_of[pages[i]->page] = i;
   std::vector<PageEntry> entries(pages.size());
   for (std::size_t i = 0; i < pages.size(); ++i) {
     const PageInSlot& page = *pages[i];
@@ -68,7 +68,7 @@ std::vector<PageEntry> entries_of(const PageTable& table) {
     const auto refined =
         static_cast<std::uint32_t>(shape.slot_of(refined_by(shape, pages[i]->page)));
     entries[i].above = above->slot * clusters_per_slot + refined;
-    PageEntry& entry_above = entries[place_of.at(above->page)];
+    PageEntry& entry_above = entries[position_of.at(above->page)];
     entry_above.below_since_s[refined - entry_above.first_bottom] = pages[i]->shown_since_s;
   }
   return entries;

@@ -46,7 +46,7 @@ class PartPixels {
     return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f,
             in_picture(shape, x_px_ - column_ + middle + x, y_px_ - row_ + middle + y)};
   }
-  __device__ int2 place(int i) const { return make_int2(x_px_, y_px_ + i * rows_per_pass); }
+  __device__ int2 position(int i) const { return make_int2(x_px_, y_px_ + i * rows_per_pass); }
   __device__ int in_tile(int i) const { return in_tile_ + i * rows_per_pass * part_side_px; }
 
  private:

@@ -44,12 +44,12 @@ __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
 }
 
 /// Places taken by the block's earlier threads, or by all of them.
-struct Places {
+struct Positions {
   std::uint32_t slices, slices_without_reserve;
 };
 
-struct AddPlaces {
-  __device__ Places operator()(const Places& a, const Places& b) const {
+struct AddPositions {
+  __device__ Positions operator()(const Positions& a, const Positions& b) const {
     return {a.slices + b.slices, a.slices_without_reserve + b.slices_without_reserve};
   }
 };
@@ -73,9 +73,9 @@ __device__ std::uint32_t queued_in(int queue_class, const Cut& cut) {
   return cut.reserve + (cut.slices > c ? cut.slices - c : 0);
 }
 
-/// `first`: the tile's first slice, if any; `place`: its first place in each class of the queue.
+/// `first`: the tile's first slice, if any; `position`: its first place in each class of the queue.
 __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cut,
-                            std::uint32_t first, const std::uint32_t (&place)[queue_classes]) {
+                            std::uint32_t first, const std::uint32_t (&position)[queue_classes]) {
   const std::uint32_t slices = cut.slices + cut.reserve;
   const std::uint32_t rest = cut.listed() - cut.expected;
   const std::uint32_t first_task = slices > 1 ? p.shape.tiles() + first : t;
@@ -95,14 +95,14 @@ __device__ void write_tasks(const SplitParams& p, std::uint32_t t, const Cut& cu
     const bool in_last = s >= cut.slices || s + 1 >= queue_classes;
     const std::uint32_t c = in_last ? queue_classes - 1 : s;
     const std::uint32_t earlier = in_last ? s - min(cut.slices, queue_classes - 1u) : 0;
-    p.queue[c * p.shape.tiles() + place[c] + earlier] = first_task + s;
+    p.queue[c * p.shape.tiles() + position[c] + earlier] = first_task + s;
   }
 }
 
 /// Finds room for slices of the block's tiles: for all, for those that will be looked at, or for
 /// none. `cut` becomes what is left for this thread's tile. Returns its first slice.
-__device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places& before,
-                                   const Places& all) {
+__device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Positions& before,
+                                   const Positions& all) {
   enum class Room { all, without_reserve, none };
   __shared__ Room room;
   __shared__ std::uint32_t first_in_block;
@@ -119,16 +119,16 @@ __device__ std::uint32_t make_room(const SplitParams& p, Cut& cut, const Places&
 }
 
 __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p) {
-  using Scan = cub::BlockScan<Places, split_block>;
+  using Scan = cub::BlockScan<Positions, split_block>;
   __shared__ Scan::TempStorage scratch;
   __shared__ std::uint32_t queued[queue_classes];  // by the block; then before the block
   const std::uint32_t tiles = p.shape.tiles();
   const std::uint32_t t = blockIdx.x * split_block + threadIdx.x;
   const bool present = t < tiles;
   Cut cut = present ? cut_of(p, t) : Cut{};
-  Places before{}, all{};
-  Scan(scratch).ExclusiveScan({cut.stored(), cut.without_reserve().stored()}, before, Places{},
-                              AddPlaces{}, all);
+  Positions before{}, all{};
+  Scan(scratch).ExclusiveScan({cut.stored(), cut.without_reserve().stored()}, before, Positions{},
+                              AddPositions{}, all);
   if (threadIdx.x < queue_classes) queued[threadIdx.x] = 0;
   const unsigned long long expected = __reduce_add_sync(~0u, cut.expected);
   const std::uint32_t longest = __reduce_max_sync(~0u, cut.listed());
@@ -138,11 +138,11 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   }
   __syncthreads();
   const std::uint32_t first = make_room(p, cut, before, all);
-  std::uint32_t place[queue_classes];
+  std::uint32_t position[queue_classes];
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) {
     const std::uint32_t n = present ? queued_in(c, cut) : 0;
-    place[c] = n > 0 ? atomicAdd(&queued[c], n) : 0;
+    position[c] = n > 0 ? atomicAdd(&queued[c], n) : 0;
   }
   __syncthreads();
   if (threadIdx.x < queue_classes)
@@ -150,10 +150,10 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   __syncthreads();
   if (!present) return;
 #pragma unroll
-  for (int c = 0; c < queue_classes; ++c) place[c] += queued[c];
+  for (int c = 0; c < queue_classes; ++c) position[c] += queued[c];
   p.reach[t] = 0;
   p.tile_slices[t] = make_uint2(first, cut.stored());
-  write_tasks(p, t, cut, first, place);
+  write_tasks(p, t, cut, first, position);
 }
 
 constexpr int composite_block = 256;

@@ -54,15 +54,15 @@ std::vector<Group> find_groups(const VoxelGrid& grid) {
 Content corners_of(const Bounds& box, float radius) {
   Content content{box, {}, radius};
   for (int i = 0; i < 8; ++i)
-    content.places.push_back({(i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y,
-                              (i & 4 ? box.max : box.min).z});
+    content.positions.push_back({(i & 1 ? box.max : box.min).x, (i & 2 ? box.max : box.min).y,
+                                 (i & 4 ? box.max : box.min).z});
   return content;
 }
 
 }  // namespace
 
 Content find_content(const VoxelGrid& grid, const Bounds& core) {
-  constexpr std::size_t max_places = 8192;
+  constexpr std::size_t max_positions = 8192;
   std::vector<Group> groups = find_groups(grid);
   const float radius = 0.5f * std::sqrt(3.0f) * grid.cell_size();
   if (groups.empty()) return corners_of(core, radius);
@@ -71,16 +71,16 @@ Content find_content(const VoxelGrid& grid, const Bounds& core) {
   std::size_t total = 0;
   for (const Group& group : groups) total += group.size();
 
-  const std::size_t step = total / max_places + 1;
+  const std::size_t step = total / max_positions + 1;
   const glm::vec3 first = grid.centre_of(groups.front().front());
   Content content{{first, first}, {}, radius};
   std::size_t next = 0;
   for (const Group& group : groups)
     for (const glm::ivec3& cell : group) {
-      const glm::vec3 place = grid.centre_of(cell);
-      content.bounds.min = glm::min(content.bounds.min, place);
-      content.bounds.max = glm::max(content.bounds.max, place);
-      if (next++ % step == 0) content.places.push_back(place);
+      const glm::vec3 position = grid.centre_of(cell);
+      content.bounds.min = glm::min(content.bounds.min, position);
+      content.bounds.max = glm::max(content.bounds.max, position);
+      if (next++ % step == 0) content.positions.push_back(position);
     }
   return content;
 }
@@ -100,8 +100,8 @@ OuterView fit(const Content& content, const glm::vec3& forward, const glm::vec3&
   const float k[2] = {margin * half_width, margin * half_height};
   glm::vec2 high(std::numeric_limits<float>::lowest()), low = high;
   glm::vec2 depth(std::numeric_limits<float>::max(), std::numeric_limits<float>::lowest());
-  for (const glm::vec3& place : content.places) {
-    const glm::vec3 p = to_camera * (place - middle);
+  for (const glm::vec3& position : content.positions) {
+    const glm::vec3 p = to_camera * (position - middle);
     depth = {std::min(depth.x, p.z), std::max(depth.y, p.z)};
     for (int axis = 0; axis < 2; ++axis) {
       const float ball = content.radius * std::sqrt(1.0f + k[axis] * k[axis]);

@@ -13,9 +13,9 @@ namespace catgs::first_sight {
 
 /// The subject of a view from outside: its large connected parts, without stray Gaussians.
 struct Content {
-  Bounds bounds;                  // of the places
-  std::vector<glm::vec3> places;  // an even sample of its occupied cells
-  float radius = 0.0f;            // of the ball around a cell
+  Bounds bounds;                     // of the places
+  std::vector<glm::vec3> positions;  // an even sample of its occupied cells
+  float radius = 0.0f;               // of the ball around a cell
 };
 
 /// The connected groups of occupied cells that hold more than a hundredth of the largest one's

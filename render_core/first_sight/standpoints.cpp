@@ -36,7 +36,7 @@ std::array<glm::vec3, directions> sphere() {
 
 /// The view from a point in all directions.
 struct Surroundings {
-  glm::vec3 place;
+  glm::vec3 point;
   float height = 0.0f;                       // above the ground
   float enclosure = 0.0f;                    // share of all directions that something stops
   float worth = 0.0f;                        // of the place, before a heading is chosen
@@ -52,7 +52,7 @@ class Explorer {
         reach_(std::max(glm::distance(box.min, box.max), grid.cell_size())) {}
 
   /// The surroundings of a free place above some ground; nothing for others.
-  [[nodiscard]] std::optional<Surroundings> explore(const glm::vec3& place) const;
+  [[nodiscard]] std::optional<Surroundings> explore(const glm::vec3& point) const;
   [[nodiscard]] InnerView view(const Surroundings& from, int heading) const;
   [[nodiscard]] float reach() const { return reach_; }
 
@@ -64,18 +64,18 @@ class Explorer {
   std::array<glm::vec3, directions> rays_ = sphere();
 };
 
-std::optional<Surroundings> Explorer::explore(const glm::vec3& place) const {
-  if (grid_.depth_around(place) > free_optical_depth) return std::nullopt;
-  const float below = grid_.distance_along(place, -up_);
+std::optional<Surroundings> Explorer::explore(const glm::vec3& point) const {
+  if (grid_.depth_around(point) > free_optical_depth) return std::nullopt;
+  const float below = grid_.distance_along(point, -up_);
   if (below == VoxelGrid::never) return std::nullopt;
-  Surroundings around{place};
+  Surroundings around{point};
   std::size_t stopped = 0;
   for (std::size_t d = 0; d < directions; ++d) {
-    const float distance = grid_.distance_along(place, rays_[d]);
+    const float distance = grid_.distance_along(point, rays_[d]);
     stopped += distance < VoxelGrid::never;
     around.distance[d] = std::min(distance, reach_);
   }
-  const float above = grid_.distance_along(place, up_);
+  const float above = grid_.distance_along(point, up_);
   around.height = below;
   around.enclosure = static_cast<float>(stopped) / directions;
   const float height = above == VoxelGrid::never ? 0.5f : below / (below + above);
@@ -103,12 +103,12 @@ InnerView Explorer::view(const Surroundings& from, int heading) const {
     ahead += from.distance[d];
     ++count_ahead;
   }
-  const glm::vec3 inwards = 0.5f * (box_.min + box_.max) - from.place;
+  const glm::vec3 inwards = 0.5f * (box_.min + box_.max) - from.point;
   const float facing =
       0.75f + 0.25f * glm::dot(level, inwards) / std::max(glm::length(inwards), 1e-6f);
   const float mean = sum / static_cast<float>(count);
   const float clear = std::min(1.0f, nearest / (too_near * mean));
-  return {look_at(from.place, from.place + forward, up_),
+  return {look_at(from.point, from.point + forward, up_),
           from.worth * facing * clear * mean / reach_,
           ahead / static_cast<float>(std::max(1, count_ahead)), from.height};
 }
@@ -132,10 +132,10 @@ std::vector<InnerView> pick(std::vector<InnerView> views, float apart) {
 
 Inside look_inside(const VoxelGrid& grid, const Bounds& box, const glm::vec3& up,
                    ThreadPool& pool) {
-  constexpr float places = 4096.0f;
+  constexpr float positions = 4096.0f;
   constexpr float enclosed = 0.8f;
   const glm::vec3 extent = glm::max(box.max - box.min, glm::vec3(grid.cell_size()));
-  const float step = std::cbrt(extent.x * extent.y * extent.z / places);
+  const float step = std::cbrt(extent.x * extent.y * extent.z / positions);
   const glm::ivec3 size = glm::max(glm::ivec3(extent / step), glm::ivec3(1));
   const Explorer explorer(grid, box, up);
   const auto count = static_cast<std::size_t>(size.x * size.y * size.z);

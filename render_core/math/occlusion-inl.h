@@ -68,8 +68,8 @@ CATGS_HD_INLINE T occlusion_limit(const CameraModel<T>& now, const CameraModel<T
   const T unknown = T(INFINITY), zero = T(0.0);
   const CarriedRay<T> ray = carried_ray(now, last, middle_px);
   const auto end_at = [&](const Vec3<T>& point) {
-    const Vec2<T> place = image_px(last, point);
-    return select(point.z > zero, deepest_end(place.x, place.y), unknown);
+    const Vec2<T> position = image_px(last, point);
+    return select(point.z > zero, deepest_end(position.x, position.y), unknown);
   };
   T end = end_at(ray.direction);  // where the ray's far end was
   constexpr int steps = 2;

@@ -140,9 +140,9 @@ double pop_excess(const Step& shown, const Step& truth) {
     excess[i] = change(shown) - change(truth);
   }
   const auto rank = static_cast<std::size_t>(std::ceil(0.999 * static_cast<double>(count))) - 1;
-  const auto place = excess.begin() + static_cast<std::ptrdiff_t>(rank);
-  std::ranges::nth_element(excess, place);
-  return *place;
+  const auto position = excess.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::ranges::nth_element(excess, position);
+  return *position;
 }
 
 }  // namespace catgs

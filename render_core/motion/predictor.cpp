@@ -68,11 +68,11 @@ void MotionPredictor::add(const TimedPose& timed) {
   if (samples_.empty() || std::abs(sample.time_us - samples_.back().time_us) > settings_.gap_us) {
     return start_at(sample);
   }
-  const auto place = std::ranges::lower_bound(samples_, sample.time_us, {}, &Sample::time_us);
-  if (place == samples_.end()) {
+  const auto point = std::ranges::lower_bound(samples_, sample.time_us, {}, &Sample::time_us);
+  if (point == samples_.end()) {
     append(sample);
   } else {
-    insert(place, sample);
+    insert(point, sample);
   }
   const auto kept =
       std::ranges::lower_bound(samples_, samples_.back().time_us - memory_us, {}, &Sample::time_us);
@@ -91,17 +91,17 @@ void MotionPredictor::append(const Sample& sample) {
   check_forecast();
 }
 
-void MotionPredictor::insert(Samples::iterator place, const Sample& sample) {
-  if (place->time_us == sample.time_us) {
-    place->pose = sample.pose;
-  } else if (place == samples_.begin() ||
-             sample.time_us - std::prev(place)->time_us < min_step_us ||
-             place->time_us - sample.time_us < min_step_us) {
+void MotionPredictor::insert(Samples::iterator point, const Sample& sample) {
+  if (point->time_us == sample.time_us) {
+    point->pose = sample.pose;
+  } else if (point == samples_.begin() ||
+             sample.time_us - std::prev(point)->time_us < min_step_us ||
+             point->time_us - sample.time_us < min_step_us) {
     return;
   } else {
-    place = samples_.insert(place, sample);
+    point = samples_.insert(point, sample);
   }
-  for (auto i = static_cast<std::size_t>(place - samples_.begin()); i < samples_.size(); ++i) {
+  for (auto i = static_cast<std::size_t>(point - samples_.begin()); i < samples_.size(); ++i) {
     follow(i);
   }
 }

@@ -89,7 +89,7 @@ class MotionPredictor {
   using Samples = std::vector<Sample>;
 
   void append(const Sample& sample);
-  void insert(Samples::iterator place, const Sample& sample);
+  void insert(Samples::iterator position, const Sample& sample);
   void start_at(const Sample& sample);
   void follow(std::size_t index);
   void drop_a_jump_at_the_start();

@@ -62,18 +62,18 @@ SmoothPath wander(const SceneFrame& frame, const Wander& how, PortableRng& rng, 
   const SinCos<double> turn = portable_sincos(sharpest_turn);
   // A small scene is crossed more slowly, not with sharper turns.
   const double step = std::min(how.speed_m_s * how.step_s * frame.metre(), 0.08 * frame.extent());
-  const auto random_place = [&] {  // far enough from the limits to turn before them
+  const auto random_position = [&] {  // far enough from the limits to turn before them
     const glm::dvec3 share{rng.uniform(0.2, 0.8), rng.uniform(0.2, 0.8), rng.uniform(0.2, 0.8)};
     return glm::mix(frame.low(), frame.high(), share);
   };
   std::vector<glm::dvec3> points{frame.inside(frame.start())};
   glm::dvec2 heading(0.0, 1.0);  // ground axes: right, forward
-  glm::dvec3 target = random_place();
+  glm::dvec3 target = random_position();
   while (static_cast<double>(points.size()) < duration_s / how.step_s + 4.0) {
     const glm::dvec3 ahead = target - points.back();
     const glm::dvec2 wish(glm::dot(ahead, frame.right()), glm::dot(ahead, frame.forward()));
     const double distance = glm::length(wish);
-    if (distance < 3.0 * step) target = random_place();
+    if (distance < 3.0 * step) target = random_position();
     const glm::dvec2 aim = distance > 0.0 ? wish / distance : heading;
     const double to_the_right = heading.y * aim.x - heading.x * aim.y;
     const double sine = std::copysign(turn.sin, to_the_right);

@@ -29,12 +29,12 @@ std::size_t count_in_view(const Camera& camera, std::span<const glm::vec3> means
 
 }  // namespace
 
-ScenePlace::ScenePlace(const Bounds& robust_bounds, const SceneHints& hints)
+ScenePosition::ScenePosition(const Bounds& robust_bounds, const SceneHints& hints)
     : bounds(robust_bounds),
       focus(hints.focus),
       distance(glm::distance(hints.start_pose.position, hints.focus)) {}
 
-bool ScenePlace::outside(const glm::vec3& position) const {
+bool ScenePosition::outside(const glm::vec3& position) const {
   constexpr float rounding = 1.001f;  // an orbit keeps its distance, but for single precision
   return glm::clamp(position, bounds.min, bounds.max) != position &&
          glm::distance(position, focus) > rounding * distance;
@@ -59,7 +59,7 @@ std::string TraceCheck::complaint() const {
 }
 
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
-                       const ScenePlace& place, const Camera& lens, ThreadPool& pool) {
+                       const ScenePosition& point, const Camera& lens, ThreadPool& pool) {
   constexpr std::size_t max_sample = std::size_t{1} << 17;
   const std::size_t step = std::max<std::size_t>(1, (means.size() + max_sample - 1) / max_sample);
   std::vector<glm::vec3> sample;
@@ -86,7 +86,7 @@ TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> 
   check.seeing_frames = static_cast<double>(seeing) / static_cast<double>(check.frames);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const glm::vec3& position = trajectory[i].world_from_camera.position;
-    if (!place.outside(position)) continue;
+    if (!point.outside(position)) continue;
     if (!check.first_outside) check.first_outside = i;
     ++check.outside_frames;
   }

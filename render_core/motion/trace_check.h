@@ -15,8 +15,8 @@ namespace catgs {
 
 /// The place of a scene, and how far from its focus people look at it. An object is seen from
 /// outside of its bounds.
-struct ScenePlace {
-  ScenePlace(const Bounds& robust_bounds, const SceneHints& hints);
+struct ScenePosition {
+  ScenePosition(const Bounds& robust_bounds, const SceneHints& hints);
 
   Bounds bounds;  // robust_bounds() of the scene
   glm::vec3 focus;
@@ -48,6 +48,6 @@ struct TraceCheck {
 /// that project into the image of `lens` (its pose is not used). Judged by an even sample of at
 /// most 2^17 of them.
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
-                       const ScenePlace& place, const Camera& lens, ThreadPool& pool);
+                       const ScenePosition& point, const Camera& lens, ThreadPool& pool);
 
 }  // namespace catgs

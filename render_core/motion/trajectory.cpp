@@ -111,11 +111,11 @@ void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
     const glm::quat& q = pose.world_from_camera.orientation;
     const glm::dvec3 in_file = glm::dvec3(p) + origin;
     // fmt prints the shortest decimals that read back as the same number.
-    const std::string place = origin == glm::dvec3(0.0)
+    const std::string point = origin == glm::dvec3(0.0)
                                   ? fmt::format("{} {} {}", p.x, p.y, p.z)
                                   : fmt::format("{} {} {}", in_file.x, in_file.y, in_file.z);
     fmt::format_to(std::back_inserter(text), "{:.6f} {} {} {} {} {}\n",
-                   static_cast<double>(pose.time_us) * 1e-6, place, q.x, q.y, q.z, q.w);
+                   static_cast<double>(pose.time_us) * 1e-6, point, q.x, q.y, q.z, q.w);
   }
   std::ofstream file(path, std::ios::binary);
   file << text << std::flush;

@@ -33,26 +33,26 @@ MortonCurve::MortonCurve(const glm::vec3& low, const glm::vec3& high) : low_(low
   cells_per_unit_ = (cells - 1.0) / glm::max(glm::dvec3(high) - low_, 1e-30);
 }
 
-std::uint64_t MortonCurve::code(const glm::vec3& place) const {
-  const glm::dvec3 cell = (glm::dvec3(place) - low_) * cells_per_unit_;
+std::uint64_t MortonCurve::code(const glm::vec3& point) const {
+  const glm::dvec3 cell = (glm::dvec3(point) - low_) * cells_per_unit_;
   return spread_bits(static_cast<std::uint64_t>(cell.x)) |
          spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
          spread_bits(static_cast<std::uint64_t>(cell.z)) << 2;
 }
 
-std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool) {
+std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> positions, ThreadPool& pool) {
   glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  for (const glm::vec3& place : places) {
-    low = glm::min(low, place);
-    high = glm::max(high, place);
+  for (const glm::vec3& point : positions) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
   }
   const MortonCurve curve(low, high);
-  std::vector<CodedIndex> codes(places.size()), scratch(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i)
-    codes[i] = {curve.code(places[i]), static_cast<std::uint32_t>(i)};
+  std::vector<CodedIndex> codes(positions.size()), scratch(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    codes[i] = {curve.code(positions[i]), static_cast<std::uint32_t>(i)};
   RadixSorter sorter;
   sorter.sort(codes, scratch, 63, pool);
-  std::vector<std::uint32_t> order(places.size());
+  std::vector<std::uint32_t> order(positions.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = codes[i].value;
   return order;
 }

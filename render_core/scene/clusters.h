@@ -30,7 +30,7 @@ class MortonCurve {
   /// `low` and `high`: the ends of the box.
   MortonCurve(const glm::vec3& low, const glm::vec3& high);
   /// Place along the curve, 63 bits, of a place in the box.
-  [[nodiscard]] std::uint64_t code(const glm::vec3& place) const;
+  [[nodiscard]] std::uint64_t code(const glm::vec3& point) const;
 
  private:
   glm::dvec3 low_, cells_per_unit_;
@@ -38,7 +38,7 @@ class MortonCurve {
 
 /// Indices of places along the Morton curve of their box; equal codes keep their order. Applied to
 /// a cloud's means, cluster c is the run of indices that starts at c * cluster_size.
-std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> places, ThreadPool& pool);
+std::vector<std::uint32_t> morton_order(std::span<const glm::vec3> positions, ThreadPool& pool);
 
 /// Bounds of a cluster for culling.
 struct Cluster {

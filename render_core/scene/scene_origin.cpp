@@ -10,13 +10,13 @@
 
 namespace catgs {
 
-glm::dvec3 find_origin(std::span<const glm::vec3> places) {
-  const EvenSample even(places.size(), most_origin_places);
+glm::dvec3 find_origin(std::span<const glm::vec3> positions) {
+  const EvenSample even(positions.size(), most_origin_positions);
   std::vector<glm::vec3> sample;
   for (std::size_t k = 0; k < even.size(); ++k)  // NaN is not within
-    if (const glm::vec3& place = places[even[k]];
-        glm::all(glm::lessThanEqual(glm::abs(place), glm::vec3(max_coordinate))))
-      sample.push_back(place);
+    if (const glm::vec3& position = positions[even[k]];
+        glm::all(glm::lessThanEqual(glm::abs(position), glm::vec3(max_coordinate))))
+      sample.push_back(position);
   if (sample.empty()) return glm::dvec3(0.0);
   glm::dvec3 medians;
   std::vector<float> values(sample.size());

@@ -25,11 +25,11 @@ inline glm::dvec3 origin_near(const glm::dvec3& middle) {
 }
 
 /// The most places that decide an origin.
-inline constexpr std::size_t most_origin_places = std::size_t{1} << 16;
+inline constexpr std::size_t most_origin_positions = std::size_t{1} << 16;
 
 /// The origin of a scene with these places, which may be rounded to floats already. An even sample
 /// decides. It is near the medians, so neither outliers nor a smaller part of the scene move it.
-glm::dvec3 find_origin(std::span<const glm::vec3> places);
+glm::dvec3 find_origin(std::span<const glm::vec3> positions);
 
 /// Moves the 0 of a cloud by `by`. Floats near `by` lose nothing.
 void move_origin(GaussianCloud& cloud, const glm::dvec3& by);

@@ -16,8 +16,8 @@ struct AffineMap {
   glm::dmat3 linear{1.0};
   glm::dvec3 offset{0.0};
 
-  [[nodiscard]] glm::dvec3 operator()(const glm::dvec3& place) const {
-    return linear * place + offset;
+  [[nodiscard]] glm::dvec3 operator()(const glm::dvec3& position) const {
+    return linear * position + offset;
   }
   /// Whether all numbers are finite and the map has an inverse.
   [[nodiscard]] bool usable() const;

@@ -108,7 +108,7 @@ void paint_skyline(Painter& painter, const glm::vec2& centre, float inner, float
       const float r = inner + (outer - inner) * t;
       const SinCos turn =
           sin_cos_turns(static_cast<float>(i) * 0.61803399f + 0.01f * random.uniform());
-      const glm::vec2 place = centre + r * glm::vec2(turn.cos, turn.sin);
+      const glm::vec2 position = centre + r * glm::vec2(turn.cos, turn.sin);
       const float high =
           random.chance(0.10f) ? random.uniform(30.0f, 75.0f) : random.uniform(13.0f, 24.0f);
       const glm::vec2 half = glm::vec2{random.uniform(8.0f, 22.0f), random.uniform(8.0f, 22.0f)} *
@@ -122,8 +122,8 @@ void paint_skyline(Painter& painter, const glm::vec2& centre, float inner, float
                           .haze = haze_at(r, inner)};
       const double area =
           static_cast<double>(high) * (half.x + half.y) * 2.0 + half.x * half.y * 4.0;
-      paint_box(p, at(place.x - half.x, high, place.y - half.y),
-                at(place.x + half.x, 0.0f, place.y + half.y), finish, area / (1.0 + t),
+      paint_box(p, at(position.x - half.x, high, position.y - half.y),
+                at(position.x + half.x, 0.0f, position.y + half.y), finish, area / (1.0 + t),
                 child(key, static_cast<std::uint64_t>(i)));
     }
   });

@@ -40,13 +40,13 @@ void paint_cell(Painter& painter, const Block& block, float haze) {
   for (const Tree& tree : block.trees) {
     if (!painter.measuring()) {
       const float r = 1.6f * tree.crown;
-      painter.shadows().focus({at(tree.place.x - r, tree.height + 2.0f * r, tree.place.y - r),
-                               at(tree.place.x + r, 0, tree.place.y + r)});
+      painter.shadows().focus({at(tree.position.x - r, tree.height + 2.0f * r, tree.position.y - r),
+                               at(tree.position.x + r, 0, tree.position.y + r)});
     }
     Random random(tree.key);
     const glm::vec3 leaves = leaf_albedo(random);
-    paint_tree(painter, at(tree.place.x, 0, tree.place.y), tree.height, tree.crown, leaves, haze,
-               110.0 * tree.crown * tree.crown * detail_at(tree.place), tree.key);
+    paint_tree(painter, at(tree.position.x, 0, tree.position.y), tree.height, tree.crown, leaves,
+               haze, 110.0 * tree.crown * tree.crown * detail_at(tree.position), tree.key);
   }
   paint_props(painter, block, haze);
   const glm::vec2 corner = block.lot.min - 10.0f;
@@ -192,7 +192,8 @@ void City::paint_backdrop(GaussianCloud& cloud, std::size_t to) const {
 
 SceneHints City::hints() const {
   SceneHints hints;
-  hints.start_pose = look_at(at(start_place.x, 11.0f, start_place.y), at(-8.0f, 4.0f, 40.0f), up);
+  hints.start_pose =
+      look_at(at(start_position.x, 11.0f, start_position.y), at(-8.0f, 4.0f, 40.0f), up);
   hints.near_z = 0.2f;
   hints.scale = 14.0f;
   hints.limits = {at(city_centre.x - radius_, 90.0f, city_centre.y - radius_),

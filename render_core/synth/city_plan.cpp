@@ -44,9 +44,9 @@ Building make_house(std::uint64_t key, const Rect& base) {
 }
 
 /// Houses side by side from `start` to `end`; `place(from, to)` makes the rectangle of one.
-template <typename Place>
+template <typename Position>
 void add_row(Block& block, std::uint64_t key, float start, float end, Side street, Side first,
-             Side last, bool open_ends, const Place& place) {
+             Side last, bool open_ends, const Position& position) {
   Random random(key);
   const float length = end - start;
   const int lots = std::max(1, static_cast<int>(std::floor(length / 15.5f + 0.5f)));
@@ -58,7 +58,7 @@ void add_row(Block& block, std::uint64_t key, float start, float end, Side stree
   }
   const std::size_t begin = block.buildings.size();
   for (std::size_t i = 0; i < static_cast<std::size_t>(lots); ++i) {
-    Building b = make_house(child(key, i), place(cuts[i], cuts[i + 1]));
+    Building b = make_house(child(key, i), position(cuts[i], cuts[i + 1]));
     b.sides[static_cast<std::size_t>(street)] = SideUse::street;
     const SideUse end_use = open_ends ? SideUse::street : SideUse::party;
     b.sides[static_cast<std::size_t>(first)] = i == 0 ? end_use : SideUse::party;
@@ -124,9 +124,9 @@ void plan_towers(Block& block) {
   }
 }
 
-bool is_free(const Block& block, const glm::vec2& place, float distance) {
+bool is_free(const Block& block, const glm::vec2& position, float distance) {
   return std::none_of(block.trees.begin(), block.trees.end(), [&](const Tree& tree) {
-    const glm::vec2 d = tree.place - place;
+    const glm::vec2 d = tree.position - position;
     return glm::dot(d, d) < distance * distance;
   });
 }
@@ -136,14 +136,14 @@ void plan_park(Block& block) {
   const glm::vec2 size = block.lot.size();
   for (int attempt = 0; attempt < 90 && block.trees.size() < 34; ++attempt) {
     const glm::vec2 t{random.uniform(), random.uniform()};
-    const glm::vec2 place = block.lot.min + 3.0f + (size - 6.0f) * t;
+    const glm::vec2 position = block.lot.min + 3.0f + (size - 6.0f) * t;
     const glm::vec2 from_middle = (t - 0.5f) * 2.0f;
     // A lawn with its pond in the middle, two paths that cross there, trees around.
     if (glm::dot(from_middle, from_middle) < 0.36f) continue;
     if (std::abs(from_middle.x) < 0.09f || std::abs(from_middle.y) < 0.09f) continue;
-    if (!is_free(block, place, 5.5f)) continue;
+    if (!is_free(block, position, 5.5f)) continue;
     block.trees.push_back(
-        {random.bits(), place, random.uniform(7.0f, 11.0f), random.uniform(2.5f, 3.9f)});
+        {random.bits(), position, random.uniform(7.0f, 11.0f), random.uniform(2.5f, 3.9f)});
   }
 }
 
@@ -176,9 +176,9 @@ void plan_square(Block& block) {
 
 /// Trees, lamps and cars along one street of this width; `place(along, across)` makes the point,
 /// across counted from the middle of the road.
-template <typename Place>
+template <typename Position>
 void plan_street(Block& block, std::uint64_t key, float width, float from, float to, bool along_x,
-                 const Place& place) {
+                 const Position& position) {
   Random random(key);
   const float pavement = pavement_width(width);
   const float kerb = width * 0.5f - pavement;
@@ -189,27 +189,27 @@ void plan_street(Block& block, std::uint64_t key, float width, float from, float
     for (float a = from + 5.0f; a < to - 4.0f; a += avenue ? 8.5f : 10.5f, ++index) {
       if (lined) {
         const float height = avenue ? random.uniform(7.0f, 8.6f) : random.uniform(5.5f, 7.0f);
-        block.trees.push_back({random.bits(), place(a, side * (kerb + 1.2f)), height,
+        block.trees.push_back({random.bits(), position(a, side * (kerb + 1.2f)), height,
                                height * random.uniform(0.27f, 0.33f)});
       }
       if (index % 3 == 1) {
-        const glm::vec2 foot = place(a + 4.2f, side * (kerb + 0.7f));
-        const glm::vec2 road = place(a + 4.2f, 0.0f);
+        const glm::vec2 foot = position(a + 4.2f, side * (kerb + 0.7f));
+        const glm::vec2 road = position(a + 4.2f, 0.0f);
         block.lamps.push_back({foot, glm::normalize(road - foot)});
       }
     }
     for (float a = from + 4.0f; a < to - 6.0f; a += 5.6f) {  // parked
       if (random.chance(0.62f)) {
         block.cars.push_back({random.bits(),
-                              place(a + random.uniform(-0.3f, 0.3f), side * (kerb - 1.15f)),
+                              position(a + random.uniform(-0.3f, 0.3f), side * (kerb - 1.15f)),
                               along_x, side > 0.0f});
       }
     }
     for (float a = from + 8.0f; a < to - 8.0f; a += 17.0f) {  // driving
       if (random.chance(avenue ? 0.45f : 0.25f)) {
-        block.cars.push_back({random.bits(),
-                              place(a + random.uniform(-4.0f, 4.0f), side * (kerb - 2.2f) * 0.5f),
-                              along_x, side > 0.0f});
+        block.cars.push_back(
+            {random.bits(), position(a + random.uniform(-4.0f, 4.0f), side * (kerb - 2.2f) * 0.5f),
+             along_x, side > 0.0f});
       }
     }
   }
@@ -230,10 +230,10 @@ float Building::roof_height() const {
   }
 }
 
-float detail_at(const glm::vec2& place) {
-  const glm::vec2 nearest(0.0f, glm::clamp(place.y, -5.0f, 60.0f));
-  const glm::vec2 d = (place - nearest) / 27.0f;
-  const glm::vec2 from_start = (place - start_place - glm::vec2(0.0f, 17.0f)) / 13.0f;
+float detail_at(const glm::vec2& position) {
+  const glm::vec2 nearest(0.0f, glm::clamp(position.y, -5.0f, 60.0f));
+  const glm::vec2 d = (position - nearest) / 27.0f;
+  const glm::vec2 from_start = (position - start_position - glm::vec2(0.0f, 17.0f)) / 13.0f;
   const float underfoot =
       1.6f / (1.0f + glm::dot(from_start, from_start) * glm::dot(from_start, from_start));
   return std::max(0.09f, 1.7f / (1.0f + glm::dot(d, d))) + underfoot;
@@ -291,7 +291,8 @@ void add_shadows(const Block& block, Shadows& shadows) {
                     at(max.x, b.eaves(), max.y));
   }
   for (const Tree& t : block.trees) {
-    shadows.add_ball(at(t.place.x, t.height - t.crown * 1.1f, t.place.y), t.crown * 1.1f, 0.75f);
+    shadows.add_ball(at(t.position.x, t.height - t.crown * 1.1f, t.position.y), t.crown * 1.1f,
+                     0.75f);
   }
 }
 

@@ -45,20 +45,20 @@ struct Building {
 
 struct Tree {
   std::uint64_t key;
-  glm::vec2 place;
+  glm::vec2 position;
   float height;
   float crown;  // radius
 };
 
 struct Car {
   std::uint64_t key;
-  glm::vec2 place;
+  glm::vec2 position;
   bool along_x;
   bool forward;  // towards +x or +z
 };
 
 struct Lamp {
-  glm::vec2 place;
+  glm::vec2 position;
   glm::vec2 arm;  // unit, over the road
 };
 
@@ -82,12 +82,12 @@ inline constexpr float pond_share = 0.42f;     // of half a park's width
 
 /// The city grows around this place on the avenue at x = 0, beyond its first crossing at z = 0.
 inline constexpr glm::vec2 city_centre(-6.0f, 44.0f);
-inline constexpr glm::vec2 start_place(2.0f, -16.0f);  // of the first view
+inline constexpr glm::vec2 start_position(2.0f, -16.0f);  // of the first view
 
 /// Density of Gaussians here relative to the part of the avenue where a visit starts. It follows
 /// the number of pixels that a square metre covers from there, down to a minimum that still shows
 /// windows.
-float detail_at(const glm::vec2& place);
+float detail_at(const glm::vec2& position);
 
 /// Distance between the building lines of the street at x = 84 column (or z = 84 row).
 float street_width_x(int column);

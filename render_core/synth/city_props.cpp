@@ -15,7 +15,9 @@ constexpr std::array<glm::vec3, 8> car_paints = {
     glm::vec3(0.50f, 0.36f, 0.08f), glm::vec3(0.07f, 0.16f, 0.12f)};
 
 /// Small things stay recognisable where walls and ground are already coarse.
-float prop_detail(const glm::vec2& place) { return glm::clamp(detail_at(place), 0.25f, 1.4f); }
+float prop_detail(const glm::vec2& position) {
+  return glm::clamp(detail_at(position), 0.25f, 1.4f);
+}
 
 void paint_car(Painter& painter, const Car& car, float detail, float haze) {
   painter.divide(painter.take(170.0 * detail), [&](Painter& p) {
@@ -23,8 +25,8 @@ void paint_car(Painter& painter, const Car& car, float detail, float haze) {
     const float direction = car.forward ? 1.0f : -1.0f;
     const glm::vec2 ahead = car.along_x ? glm::vec2(direction, 0) : glm::vec2(0, direction);
     const auto point = [&](float a, float height, float c) {
-      return at(car.place.x + ahead.x * a - ahead.y * c, height,
-                car.place.y + ahead.y * a + ahead.x * c);
+      return at(car.position.x + ahead.x * a - ahead.y * c, height,
+                car.position.y + ahead.y * a + ahead.x * c);
     };
     const auto box = [&](float a0, float a1, float h0, float h1, float half, const Finish& f,
                          double w, std::uint64_t i) {
@@ -79,14 +81,14 @@ void paint_lamp(Painter& painter, const Lamp& lamp, float detail, float haze) {
     const std::uint64_t key = 7;
     const Finish iron{
         .albedo = glm::vec3(0.05f, 0.055f, 0.05f), .sky_visibility = 0.8f, .haze = haze};
-    const glm::vec2 end = lamp.place + lamp.arm * 1.3f;
+    const glm::vec2 end = lamp.position + lamp.arm * 1.3f;
     const glm::vec3 head = at(end.x, 5.6f, end.y);
-    paint_line(p, at(lamp.place.x, 0.1f, lamp.place.y), at(lamp.place.x, 0.9f, lamp.place.y), 0.3f,
-               iron, 1.5, key);
-    paint_line(p, at(lamp.place.x, 0.9f, lamp.place.y), at(lamp.place.x, 5.8f, lamp.place.y), 0.15f,
-               iron, 4.0, key);
-    paint_line(p, at(lamp.place.x, 5.8f, lamp.place.y), head + glm::vec3(0, -0.25f, 0), 0.11f, iron,
-               2.0, key);
+    paint_line(p, at(lamp.position.x, 0.1f, lamp.position.y),
+               at(lamp.position.x, 0.9f, lamp.position.y), 0.3f, iron, 1.5, key);
+    paint_line(p, at(lamp.position.x, 0.9f, lamp.position.y),
+               at(lamp.position.x, 5.8f, lamp.position.y), 0.15f, iron, 4.0, key);
+    paint_line(p, at(lamp.position.x, 5.8f, lamp.position.y), head + glm::vec3(0, -0.25f, 0), 0.11f,
+               iron, 2.0, key);
     const Finish light{.albedo = glm::vec3(0.6f), .glow = {2.4f, 1.7f, 0.8f}, .haze = haze};
     paint_blob(p, head, {0.24f, 0.2f, 0.24f}, light, 5.0, key);
     for (std::size_t halo = p.take(1.0); halo > 0; --halo) {
@@ -99,7 +101,7 @@ void paint_lamp(Painter& painter, const Lamp& lamp, float detail, float haze) {
   });
 }
 
-void paint_person(Painter& painter, const glm::vec2& place, float detail, float haze,
+void paint_person(Painter& painter, const glm::vec2& position, float detail, float haze,
                   std::uint64_t key) {
   painter.divide(painter.take(36.0 * detail), [&](Painter& p) {
     Random random(key);
@@ -115,22 +117,22 @@ void paint_person(Painter& painter, const glm::vec2& place, float detail, float 
                       .haze = haze};
     const SinCos turn = sin_cos_turns(random.uniform());
     const glm::vec2 stride = glm::vec2(turn.cos, turn.sin) * random.uniform(0.08f, 0.26f);
-    const glm::vec2 a = place + stride, b = place - stride;
+    const glm::vec2 a = position + stride, b = position - stride;
     const float ground = 0.12f;
-    paint_line(p, at(a.x, ground, a.y), at(place.x, ground + 0.86f * h, place.y), 0.17f, legs, 2.5,
-               child(key, 1));
-    paint_line(p, at(b.x, ground, b.y), at(place.x, ground + 0.86f * h, place.y), 0.17f, legs, 2.5,
-               child(key, 2));
-    paint_blob(p, at(place.x, ground + 1.14f * h, place.y), {0.21f, 0.33f * h, 0.21f}, cloth, 6.0,
-               child(key, 3));
+    paint_line(p, at(a.x, ground, a.y), at(position.x, ground + 0.86f * h, position.y), 0.17f, legs,
+               2.5, child(key, 1));
+    paint_line(p, at(b.x, ground, b.y), at(position.x, ground + 0.86f * h, position.y), 0.17f, legs,
+               2.5, child(key, 2));
+    paint_blob(p, at(position.x, ground + 1.14f * h, position.y), {0.21f, 0.33f * h, 0.21f}, cloth,
+               6.0, child(key, 3));
     const glm::vec2 shoulder(-turn.sin * 0.24f, turn.cos * 0.24f);
     for (const float side : {-1.0f, 1.0f}) {
-      const glm::vec2 s = place + shoulder * side;
+      const glm::vec2 s = position + shoulder * side;
       paint_line(p, at(s.x, ground + 1.38f * h, s.y),
                  at(s.x + stride.x * side * 0.6f, ground + 0.86f * h, s.y + stride.y * side * 0.6f),
                  0.11f, cloth, 1.5, child(key, 4));
     }
-    paint_blob(p, at(place.x, ground + 1.62f * h, place.y), {0.11f, 0.14f, 0.11f}, skin, 3.0,
+    paint_blob(p, at(position.x, ground + 1.62f * h, position.y), {0.11f, 0.14f, 0.11f}, skin, 3.0,
                child(key, 5));
   });
 }
@@ -143,8 +145,8 @@ void paint_props(Painter& painter, const Block& block, float haze) {
                 z = block_pitch_m * static_cast<float>(block.row);
     painter.shadows().focus({at(x - 14, 6, z - 14), at(x + block_pitch_m, 0, z + block_pitch_m)});
   }
-  for (const Car& car : block.cars) paint_car(painter, car, prop_detail(car.place), haze);
-  for (const Lamp& lamp : block.lamps) paint_lamp(painter, lamp, prop_detail(lamp.place), haze);
+  for (const Car& car : block.cars) paint_car(painter, car, prop_detail(car.position), haze);
+  for (const Lamp& lamp : block.lamps) paint_lamp(painter, lamp, prop_detail(lamp.position), haze);
   Random random(child(block.key, 80));
   const float x = block_pitch_m * static_cast<float>(block.column),
               z = block_pitch_m * static_cast<float>(block.row);
@@ -155,9 +157,9 @@ void paint_props(Painter& painter, const Block& block, float haze) {
     const bool on_west = random.chance(0.6f);
     const float half = on_west ? west : south;
     const float across = side * (half - random.uniform(0.7f, pavement_width(2.0f * half) - 1.2f));
-    const glm::vec2 place = on_west ? glm::vec2(x + across, z + south + along * 0.8f)
-                                    : glm::vec2(x + west + along * 0.8f, z + across);
-    paint_person(painter, place, prop_detail(place), haze,
+    const glm::vec2 position = on_west ? glm::vec2(x + across, z + south + along * 0.8f)
+                                       : glm::vec2(x + west + along * 0.8f, z + across);
+    paint_person(painter, position, prop_detail(position), haze,
                  child(block.key, 1000 + static_cast<std::uint64_t>(i)));
   }
 }

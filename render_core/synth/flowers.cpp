@@ -59,9 +59,9 @@ void paint_blossom(Painter& p, const Kind& kind, const Sun& sun, const glm::vec3
   const glm::vec3 tone = kind.petal * random.spread(0.14f);
   for (std::size_t i = 0; i < count; ++i) {
     if (i < heart) {
-      const glm::vec3 place = centre + axis * (0.12f * r);
-      p.put(leaf_like(light, sun, place, side, glm::vec3(0.2f * r, 0.2f * r, 0.08f * r), kind.heart,
-                      random));
+      const glm::vec3 position = centre + axis * (0.12f * r);
+      p.put(leaf_like(light, sun, position, side, glm::vec3(0.2f * r, 0.2f * r, 0.08f * r),
+                      kind.heart, random));
       continue;
     }
     const auto petal = static_cast<int>(i - heart) % kind.petals;

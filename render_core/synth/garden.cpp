@@ -22,8 +22,8 @@ constexpr double backdrop_share = 0.16;
 float path_x(float z) { return 0.55f * sin_cos_turns(z * 0.11f).sin; }
 
 /// Density relative to that at the table.
-float garden_detail(const glm::vec2& place) {
-  return glm::max(0.12f, 1.0f / (1.0f + glm::dot(place, place) / 6.0f));
+float garden_detail(const glm::vec2& position) {
+  return glm::max(0.12f, 1.0f / (1.0f + glm::dot(position, position) / 6.0f));
 }
 
 bool in_bed(float x, float z) {
@@ -43,18 +43,18 @@ void paint_plot(Painter& p, const glm::vec2& corner, float size, std::uint64_t k
   Random random(child(key, 2));
   constexpr int tufts = 26;
   for (int i = 0; i < tufts; ++i) {
-    const glm::vec2 place = corner + size * glm::vec2{random.uniform(), random.uniform()};
+    const glm::vec2 position = corner + size * glm::vec2{random.uniform(), random.uniform()};
     const std::uint64_t tuft = random.bits();
-    if (glm::abs(place.x - path_x(place.y)) < path_half_width) continue;
+    if (glm::abs(position.x - path_x(position.y)) < path_half_width) continue;
     const double weight = 900.0 / tufts * area;
-    if (in_bed(place.x, place.y)) {
-      paint_flower_tuft(p, at(place.x, 0, place.y), weight, tuft);
+    if (in_bed(position.x, position.y)) {
+      paint_flower_tuft(p, at(position.x, 0, position.y), weight, tuft);
       continue;
     }
     const float s = 0.14f * size;
     const glm::vec3 green =
         blend(glm::vec3(0.10f, 0.17f, 0.035f), glm::vec3(0.20f, 0.22f, 0.06f), random.uniform());
-    paint_blades(p, at(place.x - s, 0, place.y - s), {2 * s, 0, 0}, {0, 0, 2 * s},
+    paint_blades(p, at(position.x - s, 0, position.y - s), {2 * s, 0, 0}, {0, 0, 2 * s},
                  random.uniform(0.07f, 0.14f), green, 0.0f, 0.8 * weight, tuft);
   }
 }

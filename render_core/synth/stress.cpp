@@ -67,8 +67,8 @@ void paint_hard_to_blend(Painter& painter, std::uint64_t seed) {
   // Coincident: equal depths to the bit, in crowds of 64.
   paint_each(painter, 0.17, child(seed, 7), [seed](Random& r, std::size_t i) {
     Random crowd(child(seed, 0x10000 + i / 64));
-    const glm::vec3 place = random_point(crowd, room_m - 1.0f);
-    return Splat{.mean = place,
+    const glm::vec3 position = random_point(crowd, room_m - 1.0f);
+    return Splat{.mean = position,
                  .rotation = random_rotation(r),
                  .scale = glm::vec3(0.10f, 0.06f, 0.01f) * r.spread(0.3f),
                  .opacity = r.uniform(0.1f, 0.99f),

@@ -30,11 +30,11 @@ struct Grid {
   glm::mat3 axes{1.0f};    // columns: east, north, up as unit vectors of the world
   float cell = 1.0f;       // world units
 
-  [[nodiscard]] glm::vec3 from_world(const glm::vec3& place) const {
-    return glm::transpose(axes) * (place - origin) / cell;
+  [[nodiscard]] glm::vec3 from_world(const glm::vec3& position) const {
+    return glm::transpose(axes) * (position - origin) / cell;
   }
-  [[nodiscard]] glm::vec3 to_world(const glm::vec3& place) const {
-    return origin + axes * place * cell;
+  [[nodiscard]] glm::vec3 to_world(const glm::vec3& position) const {
+    return origin + axes * position * cell;
   }
 };
 

@@ -26,27 +26,27 @@ struct Comb {
         std::clamp(std::ceil(2.0f * reach * sigma), 1.0f, static_cast<float>(most)));
     for (int k = 0; k < points; ++k) total += density(k);
   }
-  [[nodiscard]] float place(int k) const {  // standard deviations
+  [[nodiscard]] float position(int k) const {  // standard deviations
     return reach * (static_cast<float>(2 * k + 1) / static_cast<float>(points) - 1.0f);
   }
   [[nodiscard]] float weight(int k) const { return density(k) / total; }
 
  private:
-  [[nodiscard]] float density(int k) const { return std::exp(-0.5f * place(k) * place(k)); }
+  [[nodiscard]] float density(int k) const { return std::exp(-0.5f * position(k) * position(k)); }
 };
 
 }  // namespace
 
-bool Occupancy::share_of(const glm::vec3& place, float depth, Shares& to) const {
-  if (!(place.x >= 0.0f && place.y >= 0.0f && place.z >= 0.0f && place.x < grid_side &&
-        place.y < grid_side && place.z < grid_levels))
+bool Occupancy::share_of(const glm::vec3& position, float depth, Shares& to) const {
+  if (!(position.x >= 0.0f && position.y >= 0.0f && position.z >= 0.0f && position.x < grid_side &&
+        position.y < grid_side && position.z < grid_levels))
     return false;
-  const glm::ivec3 cell(place), block = cell / block_side, in = cell % block_side;
+  const glm::ivec3 cell(position), block = cell / block_side, in = cell % block_side;
   const auto column = static_cast<std::uint32_t>(block.y * blocks + block.x);
   to[(column ^ column >> 7) % shards].push_back(
       {column, static_cast<std::uint16_t>(block.z),
        static_cast<std::uint16_t>((in.y * block_side + in.x) * block_side + in.z), depth,
-       depth * (place.z - static_cast<float>(cell.z))});
+       depth * (position.z - static_cast<float>(cell.z))});
   return true;
 }
 
@@ -69,10 +69,10 @@ std::size_t Occupancy::spread(const GaussianCloud& part, std::size_t i, Shares& 
   std::size_t count = 0;
   for (int a = 0; a < u.points; ++a)
     for (int b = 0; b < v.points; ++b) {
-      const glm::vec3 middle = mean + step[axes[0]] * u.place(a) + step[axes[1]] * v.place(b);
+      const glm::vec3 middle = mean + step[axes[0]] * u.position(a) + step[axes[1]] * v.position(b);
       const float depth = area * u.weight(a) * v.weight(b);
       for (int c = 0; c < w.points; ++c)
-        count += share_of(middle + step[axes[2]] * w.place(c), depth * w.weight(c), to) ? 1 : 0;
+        count += share_of(middle + step[axes[2]] * w.position(c), depth * w.weight(c), to) ? 1 : 0;
     }
   return count;
 }

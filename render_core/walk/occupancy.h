@@ -75,7 +75,7 @@ class Occupancy {
   using Shares = std::array<std::vector<Share>, shards>;
 
   std::size_t spread(const GaussianCloud& part, std::size_t i, Shares& to) const;
-  bool share_of(const glm::vec3& place, float depth, Shares& to) const;
+  bool share_of(const glm::vec3& position, float depth, Shares& to) const;
   void take(const std::vector<Share>& from, std::size_t& blocks_taken);
 
   Grid grid_;

@@ -17,7 +17,8 @@ float steepness(const WalkMap& map, const glm::ivec2& column, float height) {
   glm::vec2 rise(0.0f);
   for (int axis = 0; axis < 2; ++axis) {
     const glm::ivec2 beside = column + (axis == 0 ? glm::ivec2(1, 0) : glm::ivec2(0, 1));
-    if (const Place* place = map.clear_at(beside, height)) rise[axis] = place->cells() - height;
+    if (const Position* position = map.clear_at(beside, height))
+      rise[axis] = position->cells() - height;
   }
   return glm::length(rise);
 }
@@ -25,11 +26,11 @@ float steepness(const WalkMap& map, const glm::ivec2& column, float height) {
 /// Higher places cover lower ones, and obstacles cover ground.
 glm::vec3 colour_of(const WalkMap& map, std::size_t storey, const glm::ivec2& column) {
   glm::vec3 colour = unknown;
-  for (const Place& place : map.at(column)) {
-    if (map.storey_at(place.cells()) != storey) continue;
-    switch (place.kind) {
+  for (const Position& position : map.at(column)) {
+    if (map.storey_at(position.cells()) != storey) continue;
+    switch (position.kind) {
       case Kind::clear:
-        colour = glm::vec3(1.0f - 0.3f * std::min(steepness(map, column, place.cells()), 1.0f));
+        colour = glm::vec3(1.0f - 0.3f * std::min(steepness(map, column, position.cells()), 1.0f));
         break;
       case Kind::near:
         colour = glm::vec3(0.92f);
@@ -57,7 +58,7 @@ Image draw_plan(const WalkMap& map, std::size_t storey) {
   for (int y = 0; y < image.size_px.y; ++y)
     for (int x = 0; x < image.size_px.x; ++x) {
       const glm::ivec2 column(x / side, map.size.y - 1 - y / side);
-      const bool starts = has_start && glm::distance(glm::vec2(column) + 0.5f, map.start.place) <
+      const bool starts = has_start && glm::distance(glm::vec2(column) + 0.5f, map.start.position) <
                                            Person::in_cells(map.person.radius);
       const glm::vec3 colour = starts ? red : colour_of(map, storey, column);
       image.rgb.insert(image.rgb.end(), {colour.r, colour.g, colour.b});

@@ -12,9 +12,9 @@ std::vector<Storey> find_storeys(const WalkMap& map) {
   constexpr double little = 0.1;             // of the smaller of two storeys, in a bin between them
   std::array<std::uint32_t, bins> area{};
   std::uint32_t total = 0;
-  for (const Place& place : map.places)
-    if (place.kind == Kind::clear) {
-      ++area[place.height / static_cast<std::size_t>(Place::per_cell)];
+  for (const Position& position : map.positions)
+    if (position.kind == Kind::clear) {
+      ++area[position.height / static_cast<std::size_t>(Position::per_cell)];
       ++total;
     }
   const auto of = [&](std::size_t bin) {  // a floor may lie on the border of two bins

@@ -35,7 +35,7 @@ struct WalkFileHeader {
   float cells_per_eye_height = walk::cells_per_eye_height;
   std::array<float, 3> start{};  // east, north, height; cells
   std::array<std::uint32_t, 2> size{};
-  std::uint32_t places = 0;
+  std::uint32_t positions = 0;
   std::uint32_t tile_side = walk::tile_side;
   std::uint32_t packed_bytes = 0;  // the index and the tiles, up to the end of the file
   std::uint32_t storeys = 0;
@@ -100,7 +100,7 @@ class Reader {
     if (header_.version == WalkFileHeader::version_with_origin) rest = read_origin(rest);
     require(header_.packed_bytes == rest.size(), "packed bytes", "are not those behind the header");
     read_tiles(rest);
-    const glm::ivec2 start(glm::floor(map_.start.place));
+    const glm::ivec2 start(glm::floor(map_.start.position));
     require(map_.clear_at(start, map_.start.height), "start", "is not clear ground");
     return std::move(map_);
   }
@@ -143,7 +143,7 @@ class Reader {
     require(h.size[0] >= 1 && h.size[0] <= grid_side && h.size[1] >= 1 && h.size[1] <= grid_side,
             "size", "is out of range");
     map_.size = glm::ivec2(h.size[0], h.size[1]);
-    require(h.places <= std::min(most_places, columns() * most_in_column), "places",
+    require(h.positions <= std::min(most_positions, columns() * most_in_column), "places",
             "are too many");
     require(h.tile_side == walk::tile_side, "tile side", "is not 64");
     require(h.storeys >= 1 && h.storeys <= most_storeys, "storeys", "are not 1 to 16");
@@ -193,7 +193,7 @@ class Reader {
     }
     require(packed == bytes.size(), "index", "is not that of the tiles");
     // Each place has a kind and a height.
-    require(2 * std::uint64_t{header_.places} <= unpacked, "places",
+    require(2 * std::uint64_t{header_.positions} <= unpacked, "places",
             "are more than the tiles have");
     return index;
   }
@@ -201,32 +201,33 @@ class Reader {
   void read_tiles(std::span<const std::byte> bytes) {
     const std::vector<TileBytes> index = read_index(bytes);
     map_.first.assign(columns() + 1, 0);
-    std::vector<Place> by_tile;
-    by_tile.reserve(header_.places);
+    std::vector<Position> by_tile;
+    by_tile.reserve(header_.positions);
     each_tile(map_.size, [&](std::size_t t, std::span<const std::size_t> of_tile) {
       if (index[t].packed == 0) return;
       read_tile(unpacked(bytes.first(index[t].packed), index[t].unpacked), of_tile, by_tile);
       bytes = bytes.subspan(index[t].packed);
     });
-    require(by_tile.size() == header_.places, "tiles", "have other places than the file");
+    require(by_tile.size() == header_.positions, "tiles", "have other places than the file");
     std::partial_sum(map_.first.begin(), map_.first.end(), map_.first.begin());
-    map_.places.resize(by_tile.size());
+    map_.positions.resize(by_tile.size());
     auto next = by_tile.begin();
     each_tile(map_.size, [&](std::size_t, std::span<const std::size_t> of_tile) {
       for (const std::size_t c : of_tile)
-        for (std::uint32_t i = map_.first[c]; i < map_.first[c + 1]; ++i) map_.places[i] = *next++;
+        for (std::uint32_t i = map_.first[c]; i < map_.first[c + 1]; ++i)
+          map_.positions[i] = *next++;
     });
   }
 
-  /// Notes how many places each column has, and appends them to `places`.
+  /// Notes how many places each column has, and appends them to `positions`.
   void read_tile(std::span<const std::byte> bytes, std::span<const std::size_t> of_tile,
-                 std::vector<Place>& places) {
+                 std::vector<Position>& positions) {
     require(bytes.size() >= of_tile.size(), "a tile", "is cut off");
     const std::span counts = bytes.first(of_tile.size());
     std::size_t count = 0;
     for (const std::byte in_column : counts) count += static_cast<std::size_t>(in_column);
     bytes = bytes.subspan(counts.size());
-    require(count <= std::min(bytes.size(), header_.places - places.size()), "a tile",
+    require(count <= std::min(bytes.size(), header_.positions - positions.size()), "a tile",
             "has too many places");
     std::span kinds = bytes.first(count);
     bytes = bytes.subspan(count);
@@ -240,10 +241,10 @@ class Reader {
         kinds = kinds.subspan(1);
         last[k] += read_difference(bytes);
         const bool right = kind <= static_cast<std::uint8_t>(Kind::obstacle) && last[k] >= 0 &&
-                           last[k] < grid_levels * static_cast<int>(Place::per_cell) &&
+                           last[k] < grid_levels * static_cast<int>(Position::per_cell) &&
                            (k == 0 || last[k] > last[k - 1]);
         require(right, "a place", "is out of range");
-        places.push_back({static_cast<std::uint16_t>(last[k]), static_cast<Kind>(kind)});
+        positions.push_back({static_cast<std::uint16_t>(last[k]), static_cast<Kind>(kind)});
       }
     }
     require(bytes.empty(), "a tile", "has more than its places");
@@ -277,8 +278,8 @@ std::vector<std::string> tiles_of(const WalkMap& map) {
     for (const std::size_t c : columns) {
       counts.push_back(static_cast<char>(map.first[c + 1] - map.first[c]));
       for (std::uint32_t i = map.first[c]; i < map.first[c + 1]; ++i) {
-        kinds.push_back(static_cast<char>(map.places[i].kind));
-        const int height = map.places[i].height;
+        kinds.push_back(static_cast<char>(map.positions[i].kind));
+        const int height = map.positions[i].height;
         const int d = height - std::exchange(last[i - map.first[c]], height);
         std::uint32_t code = static_cast<std::uint32_t>(d) << 1 ^ (d < 0 ? ~0u : 0u);
         for (; code >= 128; code >>= 7) heights.push_back(static_cast<char>(code | 128));
@@ -308,7 +309,7 @@ std::string packed_tiles(std::span<const std::string> tiles) {
 }
 
 std::string pack(const WalkMap& map) {
-  assert(map.places.size() <= most_places);
+  assert(map.positions.size() <= most_positions);
   const std::string tiles = packed_tiles(tiles_of(map));
   WalkFileHeader h;
   std::memcpy(h.origin.data(), &map.grid.origin, sizeof h.origin);
@@ -316,9 +317,9 @@ std::string pack(const WalkMap& map) {
   h.cell = map.grid.cell;
   const Person& p = map.person;
   h.person = {p.radius, p.height, p.step, p.slope, p.chest};
-  h.start = {map.start.place.x, map.start.place.y, map.start.height};
+  h.start = {map.start.position.x, map.start.position.y, map.start.height};
   h.size = {static_cast<std::uint32_t>(map.size.x), static_cast<std::uint32_t>(map.size.y)};
-  h.places = static_cast<std::uint32_t>(map.places.size());
+  h.positions = static_cast<std::uint32_t>(map.positions.size());
   h.packed_bytes = static_cast<std::uint32_t>(tiles.size());
   h.storeys = static_cast<std::uint32_t>(std::min(map.storeys.size(), most_storeys));
   std::copy_n(map.storeys.begin(), h.storeys, h.storey.begin());
@@ -340,10 +341,10 @@ void write_walk_file(const WalkMap& map, const std::filesystem::path& path) {
   std::size_t in_column = 0;
   for (std::size_t c = 0; c + 1 < map.first.size(); ++c)
     in_column = std::max<std::size_t>(in_column, map.first[c + 1] - map.first[c]);
-  if (map.places.size() > most_places || in_column > most_in_column)
+  if (map.positions.size() > most_positions || in_column > most_in_column)
     throw InputError(path.string(), "",
                      fmt::format("{} places, {} of them above each other, are too many",
-                                 map.places.size(), in_column),
+                                 map.positions.size(), in_column),
                      "give a larger --eye-height");
   const std::string bytes = pack(map);
   PartFile file(path);

@@ -23,7 +23,7 @@ namespace catgs::walk {
 //      the tile (lowest, second…; 0 before the first), as a zigzag varint: (d << 1) ^ (d >> 31),
 //      seven bits a byte, low bits first, bit 7 where more follow
 
-inline constexpr std::size_t most_places = std::size_t{1} << 24, most_in_column = 64;
+inline constexpr std::size_t most_positions = std::size_t{1} << 24, most_in_column = 64;
 inline constexpr std::size_t most_storeys = 16;
 inline constexpr int tile_side = 64;
 

@@ -4,12 +4,12 @@
 
 namespace catgs::walk {
 
-const Place* WalkMap::clear_at(const glm::ivec2& column, float height) const {
+const Position* WalkMap::clear_at(const glm::ivec2& column, float height) const {
   if (!holds(column)) return nullptr;
-  for (const Place& place : at(column))
-    if (place.kind == Kind::clear &&
-        std::abs(place.cells() - height) <= Person::in_cells(person.step))
-      return &place;
+  for (const Position& position : at(column))
+    if (position.kind == Kind::clear &&
+        std::abs(position.cells() - height) <= Person::in_cells(person.step))
+      return &position;
   return nullptr;
 }
 

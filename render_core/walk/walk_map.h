@@ -21,13 +21,13 @@ enum class Kind : std::uint8_t {
 };
 
 /// A height of a column.
-struct Place {
+struct Position {
   static constexpr float per_cell = 16.0f;
   std::uint16_t height;  // cells * per_cell
   Kind kind;
 
   [[nodiscard]] float cells() const { return static_cast<float>(height) / per_cell; }
-  bool operator==(const Place&) const = default;
+  bool operator==(const Position&) const = default;
 };
 
 /// A floor of a building, or all of a terrain: the places from `low` up to the next storey's.
@@ -39,8 +39,8 @@ struct Storey {
 
 /// Where a walker stands.
 struct Stand {
-  glm::vec2 place{0.0f};  // east, north; cells
-  float height = 0.0f;    // of the ground, cells
+  glm::vec2 position{0.0f};  // east, north; cells
+  float height = 0.0f;       // of the ground, cells
 };
 
 /// The ground that a person reaches on foot from a start, in cells of a grid, and the obstacles
@@ -51,8 +51,8 @@ struct WalkMap {
   Person person;
   Stand start;
   glm::ivec2 size{0};                // columns
-  std::vector<std::uint32_t> first;  // size.x * size.y + 1 indices in `places`, row by row
-  std::vector<Place> places;
+  std::vector<std::uint32_t> first;  // size.x * size.y + 1 indices in `positions`, row by row
+  std::vector<Position> positions;
   std::vector<Storey> storeys;  // from below
   glm::dvec3 origin{0.0};       // of the scene: see scene_origin.h
 
@@ -60,13 +60,13 @@ struct WalkMap {
     return column.x >= 0 && column.y >= 0 && column.x < size.x && column.y < size.y;
   }
   /// The places of a column of the map.
-  [[nodiscard]] std::span<const Place> at(const glm::ivec2& column) const {
+  [[nodiscard]] std::span<const Position> at(const glm::ivec2& column) const {
     const auto i = static_cast<std::size_t>(column.y) * static_cast<std::size_t>(size.x) +
                    static_cast<std::size_t>(column.x);
-    return std::span(places).subspan(first[i], first[i + 1] - first[i]);
+    return std::span(positions).subspan(first[i], first[i + 1] - first[i]);
   }
   /// The clear ground of a column within a step of `height` (cells), if there is some.
-  [[nodiscard]] const Place* clear_at(const glm::ivec2& column, float height) const;
+  [[nodiscard]] const Position* clear_at(const glm::ivec2& column, float height) const;
   /// The index in `storeys` of a height.
   [[nodiscard]] std::size_t storey_at(float height) const;
 };

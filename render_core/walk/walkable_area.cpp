@@ -71,9 +71,9 @@ Component component_below(const Surfaces& surfaces, std::vector<char> clear, con
     const std::vector<std::uint32_t> members = flood(surfaces, i, clear, turns);
     component.size = members.size();
     for (const std::uint32_t k : members) {
-      const glm::vec3 place = middle_of(surfaces, k);
-      const float distance = glm::distance(place, start);
-      if (place.z <= start.z && distance < component.distance) {
+      const glm::vec3 position = middle_of(surfaces, k);
+      const float distance = glm::distance(position, start);
+      if (position.z <= start.z && distance < component.distance) {
         component.seed = k;
         component.distance = distance;
       }
@@ -157,8 +157,8 @@ class Collector {
       ++map.first[static_cast<std::size_t>(at.y) * static_cast<std::size_t>(map.size.x) +
                   static_cast<std::size_t>(at.x) + 1];
       const float height = std::clamp(f.height, 0.0f, grid_levels - 1.0f);
-      map.places.push_back(
-          {static_cast<std::uint16_t>(std::lround(height * Place::per_cell)), f.kind});
+      map.positions.push_back(
+          {static_cast<std::uint16_t>(std::lround(height * Position::per_cell)), f.kind});
     }
     for (std::size_t c = 1; c < map.first.size(); ++c) map.first[c] += map.first[c - 1];
     return map;
@@ -195,8 +195,8 @@ class Collector {
 
   /// Sorted by column and height. Of those within a step, ground stays, or else the higher
   /// obstacle.
-  [[nodiscard]] std::vector<Found> without_doubles(std::vector<Found> places) const {
-    std::ranges::sort(places, {}, [this](const Found& f) {
+  [[nodiscard]] std::vector<Found> without_doubles(std::vector<Found> positions) const {
+    std::ranges::sort(positions, {}, [this](const Found& f) {
       turns_.next();
       return std::tuple(f.column, f.height, f.kind);
     });
@@ -204,7 +204,7 @@ class Collector {
       return f.kind == Kind::low ? 1 : f.kind == Kind::obstacle ? 2 : 3;
     };
     std::vector<Found> single;
-    for (const Found& f : places) {
+    for (const Found& f : positions) {
       const bool apart = single.empty() || single.back().column != f.column ||
                          f.height - single.back().height > Person::in_cells(person_.step);
       if (apart)

@@ -55,7 +55,7 @@ FilmView read_view(const JsonField& field, const FilmView* before) {
   const auto number = [&](std::size_t i) { return field[i].precise_number(); };
   FilmView view;
   view.position = {number(0), number(1), number(2)};
-  static_cast<void>(field.as_place(view.position));  // in range
+  static_cast<void>(field.as_position(view.position));  // in range
   view.orientation = glm::quat(field.as_orientation({number(6), number(3), number(4), number(5)}));
   if (count == 7) {
     view.fov_y_rad = before->fov_y_rad;

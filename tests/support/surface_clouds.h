@@ -12,13 +12,13 @@
 
 namespace catgs::test {
 
-/// Opaque balls of standard deviation `size` at what `place` samples.
+/// Opaque balls of standard deviation `size` at what `position` samples.
 inline GaussianCloud sampled_surface(std::size_t count, float size,
-                                     const std::function<glm::vec3()>& place) {
+                                     const std::function<glm::vec3()>& position) {
   GaussianCloud cloud;
   cloud.resize(count, 0);
   for (std::size_t i = 0; i < count; ++i) {
-    cloud.mean[i] = place();
+    cloud.mean[i] = position();
     cloud.scale[i] = glm::vec3(size);
     cloud.rotation[i] = glm::quat(1, 0, 0, 0);
     cloud.opacity[i] = 0.9f;

@@ -32,8 +32,8 @@ double weight(const Disc& disc, const glm::dvec3& ray, const glm::dvec2& pixel) 
   const double across = glm::dot(disc.normal, ray);
   if (across != 0.0) {
     const double along = glm::dot(disc.normal, disc.centre) / across;
-    const glm::dvec3 place = along * ray - disc.centre;
-    const double u = glm::dot(place, disc.axis_u), v = glm::dot(place, disc.axis_v);
+    const glm::dvec3 point = along * ray - disc.centre;
+    const double u = glm::dot(point, disc.axis_u), v = glm::dot(point, disc.axis_v);
     if (along > 0.0) squared = std::min(squared, u * u + v * v);
   }
   return std::exp(-0.5 * squared);
@@ -99,9 +99,9 @@ GaussianCloud surfel_room() {
   cloud.resize(floor_discs + wall_discs, 0);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const bool floor = i < floor_discs;
-    const glm::vec2 place(uniform(-4.0f, 4.0f),
+    const glm::vec2 point(uniform(-4.0f, 4.0f),
                           floor ? uniform(-4.0f, 4.0f) : uniform(-2.0f, 0.0f));
-    cloud.mean[i] = floor ? glm::vec3(place.x, 0.0f, place.y) : glm::vec3(place, 4.0f);
+    cloud.mean[i] = floor ? glm::vec3(point.x, 0.0f, point.y) : glm::vec3(point, 4.0f);
     const glm::quat upright = glm::angleAxis(1.5707963f, glm::vec3(1, 0, 0));  // z becomes -y
     cloud.rotation[i] = (floor ? upright : glm::quat(1, 0, 0, 0)) *
                         glm::angleAxis(uniform(0.0f, 3.1f), glm::vec3(0, 0, 1));
@@ -110,7 +110,7 @@ GaussianCloud surfel_room() {
     cloud.scale[i].z = 1e-3f * std::min(cloud.scale[i].x, cloud.scale[i].y);  // as when loaded
     cloud.opacity[i] = uniform(0.5f, 0.95f);
     const bool dark =
-        (static_cast<int>(std::floor(place.x)) + static_cast<int>(std::floor(place.y))) % 2;
+        (static_cast<int>(std::floor(point.x)) + static_cast<int>(std::floor(point.y))) % 2;
     cloud.sh[i] = glm::vec3(dark ? -1.2f : 1.0f, uniform(-1.0f, 1.0f), dark ? 0.8f : -0.6f);
   }
   return cloud;

@@ -16,16 +16,16 @@ namespace {
 
 constexpr float piece = 0.4f;  // cells; a body moves by at most this much at a time
 
-glm::ivec2 cell_of(const glm::vec2& place) { return glm::ivec2(glm::floor(place)); }
+glm::ivec2 cell_of(const glm::vec2& position) { return glm::ivec2(glm::floor(position)); }
 
-/// Height of the ground (cells) at `place` for a walker whose ground was `height`: bilinear between
-/// the middles of cells. Empty if no clear ground is within a step.
-std::optional<float> ground_at(const WalkMap& map, const glm::vec2& place, float height) {
-  const Place* here = map.clear_at(glm::ivec2(glm::floor(place)), height);
+/// Height of the ground (cells) at `position` for a walker whose ground was `height`: bilinear
+/// between the middles of cells. Empty if no clear ground is within a step.
+std::optional<float> ground_at(const WalkMap& map, const glm::vec2& position, float height) {
+  const Position* here = map.clear_at(glm::ivec2(glm::floor(position)), height);
   if (!here) return std::nullopt;
-  const glm::vec2 corner = glm::floor(place - 0.5f), share = place - 0.5f - corner;
+  const glm::vec2 corner = glm::floor(position - 0.5f), share = position - 0.5f - corner;
   const auto at = [&](int x, int y) {
-    const Place* found = map.clear_at(glm::ivec2(corner) + glm::ivec2(x, y), here->cells());
+    const Position* found = map.clear_at(glm::ivec2(corner) + glm::ivec2(x, y), here->cells());
     return found ? found->cells() : here->cells();
   };
   return glm::mix(glm::mix(at(0, 0), at(1, 0), share.x), glm::mix(at(0, 1), at(1, 1), share.x),
@@ -35,36 +35,36 @@ std::optional<float> ground_at(const WalkMap& map, const glm::vec2& place, float
 /// One piece of a move. Between two cells that touch in a corner alone, the body passes through one
 /// of the two beside them.
 std::optional<Stand> try_piece(const WalkMap& map, const Stand& from, const glm::vec2& way) {
-  const Stand to{from.place + way, from.height};
-  const glm::ivec2 here = cell_of(from.place), there = cell_of(to.place);
-  const Place* ground = map.clear_at(here, from.height);
+  const Stand to{from.position + way, from.height};
+  const glm::ivec2 here = cell_of(from.position), there = cell_of(to.position);
+  const Position* ground = map.clear_at(here, from.height);
   if (!ground) return std::nullopt;
   if (here.x != there.x && here.y != there.y) {
-    const Place* beside = map.clear_at({there.x, here.y}, ground->cells());
+    const Position* beside = map.clear_at({there.x, here.y}, ground->cells());
     if (!beside) beside = map.clear_at({here.x, there.y}, ground->cells());
     if (!beside) return std::nullopt;
     ground = beside;
   }
-  const auto height = ground_at(map, to.place, ground->cells());
+  const auto height = ground_at(map, to.position, ground->cells());
   if (!height) return std::nullopt;
-  return Stand{to.place, *height};
+  return Stand{to.position, *height};
 }
 
 }  // namespace
 
-std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& place) {
-  const glm::vec3 at = map.grid.from_world(place);
+std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& position) {
+  const glm::vec3 at = map.grid.from_world(position);
   const glm::ivec2 column = cell_of(glm::vec2(at));
   if (!map.holds(column)) return std::nullopt;
   std::optional<Stand> stand;
-  for (const Place& ground : map.at(column))
+  for (const Position& ground : map.at(column))
     if (ground.kind == Kind::clear && ground.cells() <= at.z + Person::in_cells(map.person.step))
       stand = Stand{glm::vec2(at), ground.cells()};
   return stand;
 }
 
 glm::vec3 eyes_of(const WalkMap& map, const Stand& stand) {
-  return map.grid.to_world(glm::vec3(stand.place, stand.height + cells_per_eye_height));
+  return map.grid.to_world(glm::vec3(stand.position, stand.height + cells_per_eye_height));
 }
 
 Stand move(const WalkMap& map, const Stand& from, const glm::vec2& way) {
@@ -88,7 +88,7 @@ Stand move(const WalkMap& map, const Stand& from, const glm::vec2& way) {
 }
 
 bool straight(const WalkMap& map, const Stand& from, const Stand& to) {
-  const glm::vec2 way = to.place - from.place;
+  const glm::vec2 way = to.position - from.position;
   const int pieces = static_cast<int>(std::ceil(glm::length(way) / piece));
   Stand at = from;
   for (int k = 0; k < pieces; ++k) {
@@ -124,11 +124,11 @@ std::vector<Stand> with_straight_pieces(const WalkMap& map, const std::vector<St
 }  // namespace
 
 std::vector<Stand> find_path(const WalkMap& map, const Stand& from, const Stand& to) {
-  const Place* begin = map.clear_at(cell_of(from.place), from.height);
-  const Place* end = map.clear_at(cell_of(to.place), to.height);
+  const Position* begin = map.clear_at(cell_of(from.position), from.height);
+  const Position* end = map.clear_at(cell_of(to.position), to.height);
   if (!begin || !end) return {};
-  const auto index = [&](const Place* p) {
-    return static_cast<std::uint32_t>(p - map.places.data());
+  const auto index = [&](const Position* p) {
+    return static_cast<std::uint32_t>(p - map.positions.data());
   };
   const auto cell = [&](std::uint32_t column) {
     return glm::ivec2(static_cast<int>(column) % map.size.x, static_cast<int>(column) / map.size.x);
@@ -136,46 +136,47 @@ std::vector<Stand> find_path(const WalkMap& map, const Stand& from, const Stand&
   const auto column = [&](const glm::ivec2& c) {
     return static_cast<std::uint32_t>(c.y * map.size.x + c.x);
   };
-  std::vector<Node> nodes(map.places.size());
+  std::vector<Node> nodes(map.positions.size());
   using Entry = std::pair<float, std::uint32_t>;  // cost and the least that is left; place
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  const glm::ivec2 goal = cell_of(to.place);
+  const glm::ivec2 goal = cell_of(to.position);
   const auto left = [&](const glm::ivec2& c) {
     const glm::ivec2 d = glm::abs(goal - c);
     return static_cast<float>(std::max(d.x, d.y)) +
            0.41421356f * static_cast<float>(std::min(d.x, d.y));
   };
-  const auto reach = [&](std::uint32_t place, const glm::ivec2& c, float cost,
+  const auto reach = [&](std::uint32_t position, const glm::ivec2& c, float cost,
                          std::uint32_t before) {
-    if (cost >= nodes[place].cost) return;
-    nodes[place] = {cost, before, column(c)};
-    open.emplace(cost + left(c), place);
+    if (cost >= nodes[position].cost) return;
+    nodes[position] = {cost, before, column(c)};
+    open.emplace(cost + left(c), position);
   };
-  reach(index(begin), cell_of(from.place), 0.0f, index(begin));
+  reach(index(begin), cell_of(from.position), 0.0f, index(begin));
   while (!open.empty() && open.top().second != index(end)) {
-    const auto [estimate, place] = open.top();
+    const auto [estimate, position] = open.top();
     open.pop();
-    const glm::ivec2 c = cell(nodes[place].column);
-    if (estimate > nodes[place].cost + left(c) + 1e-3f * (1.0f + estimate)) continue;
-    const float height = map.places[place].cells();
+    const glm::ivec2 c = cell(nodes[position].column);
+    if (estimate > nodes[position].cost + left(c) + 1e-3f * (1.0f + estimate)) continue;
+    const float height = map.positions[position].cells();
     for (int y = -1; y <= 1; ++y)
       for (int x = -1; x <= 1; ++x) {
         if (x == 0 && y == 0) continue;
-        const Place* next = map.clear_at(c + glm::ivec2(x, y), height);
+        const Position* next = map.clear_at(c + glm::ivec2(x, y), height);
         const bool diagonal = x != 0 && y != 0;
         if (!next || (diagonal && (!map.clear_at(c + glm::ivec2(x, 0), height) ||
                                    !map.clear_at(c + glm::ivec2(0, y), height))))
           continue;
         reach(index(next), c + glm::ivec2(x, y),
-              nodes[place].cost + (diagonal ? 1.41421356f : 1.0f), place);
+              nodes[position].cost + (diagonal ? 1.41421356f : 1.0f), position);
       }
   }
   if (open.empty()) return {};
   if (index(begin) == index(end)) return {from, to};
   std::vector<Stand> path = {to};
-  for (std::uint32_t place = index(end); place != index(begin);) {
-    place = nodes[place].before;
-    path.push_back({glm::vec2(cell(nodes[place].column)) + 0.5f, map.places[place].cells()});
+  for (std::uint32_t position = index(end); position != index(begin);) {
+    position = nodes[position].before;
+    path.push_back(
+        {glm::vec2(cell(nodes[position].column)) + 0.5f, map.positions[position].cells()});
   }
   path.back() = from;
   std::ranges::reverse(path);

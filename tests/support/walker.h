@@ -14,7 +14,7 @@ namespace catgs::walk {
 // and tests of maps walk with it.
 
 /// The clear ground below a place of the world, where a person would come to stand.
-std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& place);
+std::optional<Stand> stand_below(const WalkMap& map, const glm::vec3& position);
 
 /// The walker's eyes in the world.
 glm::vec3 eyes_of(const WalkMap& map, const Stand& stand);

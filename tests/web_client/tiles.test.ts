@@ -32,10 +32,10 @@ const six = [
 describe('a tile', () => {
   it('has the places of its columns', () => {
     const tiles = new PackedTiles(3, 2, 6, packed([six]));
-    const { first, places } = tiles.at(0);
+    const { first, positions } = tiles.at(0);
     expect([...first]).toEqual([0, 2, 3, 4, 5, 6, 6]);
-    expect([...places].map(height_of)).toEqual([10, 12.5, 10, 10, 10, 10]);
-    expect([...places].map(kind_of)).toEqual([
+    expect([...positions].map(height_of)).toEqual([10, 12.5, 10, 10, 10, 10]);
+    expect([...positions].map(kind_of)).toEqual([
       Kind.clear,
       Kind.obstacle,
       Kind.clear,
@@ -82,7 +82,7 @@ describe('the tiles of a map', () => {
   it('lie row by row, cut off at the east and the north', () => {
     const tiles = new PackedTiles(66, 65, 194, packed([[], flat(2 * 64), flat(64), flat(2)]));
     expect([0, 1, 2, 3].map((t) => tiles.has(t))).toEqual([false, true, true, true]);
-    expect([0, 1, 2, 3].map((t) => tiles.at(t).places.length)).toEqual([0, 128, 64, 2]);
+    expect([0, 1, 2, 3].map((t) => tiles.at(t).positions.length)).toEqual([0, 128, 64, 2]);
     expect(tile_at(tiles, 65, 63)).toBe(1);
     expect(column_in_tile(tiles, 65, 63)).toBe(127);
     expect(tile_at(tiles, 65, 64)).toBe(3);

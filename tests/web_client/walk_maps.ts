@@ -34,11 +34,11 @@ export function flat_tiles(
         first.push(first.at(-1)! + Number(clear(x, y)));
     return {
       first: Uint16Array.from(first),
-      places: new Uint16Array(first.at(-1)!).fill((16 * height) << 2),
+      positions: new Uint16Array(first.at(-1)!).fill((16 * height) << 2),
     };
   });
-  const count = made.reduce((sum, { places }) => sum + places.length, 0);
-  return { width, depth, count, has: (t) => made[t]!.places.length > 0, at: (t) => made[t]! };
+  const count = made.reduce((sum, { positions }) => sum + positions.length, 0);
+  return { width, depth, count, has: (t) => made[t]!.positions.length > 0, at: (t) => made[t]! };
 }
 
 /** A map in the world as it is read of a file: all at one height, where `clear` says so. */

@@ -62,8 +62,8 @@ function rest(camera: CameraController): void {
 }
 
 /** Who runs up stairs is lower for a moment. */
-const is_clear = (on: WalkMap, place: Vec3): boolean => {
-  const [east, north, height] = to_grid(on, place);
+const is_clear = (on: WalkMap, point: Vec3): boolean => {
+  const [east, north, height] = to_grid(on, point);
   const feet = height - cells_per_eye_height;
   return [-on.step, 0, on.step].some(
     (late) => clear_at(on, Math.floor(east), Math.floor(north), feet + late) >= 0,
@@ -159,21 +159,21 @@ describe('pointing at the floor', () => {
     const n = length(way);
     return { origin, direction: [way[0] / n, way[1] / n, way[2] / n] as const };
   };
-  const place = (stand: Stand | undefined): Vec3 | undefined =>
+  const point = (stand: Stand | undefined): Vec3 | undefined =>
     stand && eyes_of(map, { ...stand, height: stand.height - cells_per_eye_height });
 
   it('finds where the ray meets it, on each floor', () => {
-    expect_vec(place(floor_along(map, ray([-1, 1, eye_m], [1, 3, 0])))!, [-0.4, 1.6, 0], -1);
-    const hit = place(floor_along(map, ray([-1.5, 1, eye_m], [-0.8, 0.8, 0])))!;
+    expect_vec(point(floor_along(map, ray([-1, 1, eye_m], [1, 3, 0])))!, [-0.4, 1.6, 0], -1);
+    const hit = point(floor_along(map, ray([-1.5, 1, eye_m], [-0.8, 0.8, 0])))!;
     expect(length(sub(hit, [-0.8, 0.8, 0]))).toBeLessThan(0.1);
-    const upper = place(floor_along(map, ray([9, 5, 2.72 + eye_m], [7.5, 4.5, 2.72])))!;
+    const upper = point(floor_along(map, ray([9, 5, 2.72 + eye_m], [7.5, 4.5, 2.72])))!;
     expect(length(sub(upper, [7.5, 4.5, 2.72]))).toBeLessThan(0.1);
-    const stair = place(floor_along(map, ray([0.5, 0.75, eye_m], [4.1, 0.75, 1.36])))!;
+    const stair = point(floor_along(map, ray([0.5, 0.75, eye_m], [4.1, 0.75, 1.36])))!;
     expect(stair[2]).toBeGreaterThan(0.5);
   });
 
   it('stops before a wall', () => {
-    const before = place(floor_along(map, ray([-1.5, 4, eye_m], [3, 4, 0.1])))!;
+    const before = point(floor_along(map, ray([-1.5, 4, eye_m], [3, 4, 0.1])))!;
     expect(before[0]).toBeGreaterThan(-1);
     expect(before[0]).toBeLessThan(0);
   });
@@ -186,7 +186,7 @@ describe('pointing at the floor', () => {
 
   it('is right below', () => {
     expect(
-      length(sub(place(floor_along(map, ray([-1, 1, eye_m], [-1, 1, 0])))!, [-1, 1, 0])),
+      length(sub(point(floor_along(map, ray([-1, 1, eye_m], [-1, 1, 0])))!, [-1, 1, 0])),
     ).toBeLessThan(0.1);
   });
 });

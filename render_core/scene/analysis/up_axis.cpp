@@ -29,7 +29,7 @@ constexpr float smallest_floor = 0.25f;  // of floor_size(); less is the side of
 
 /// A Gaussian as a small piece of some surface.
 struct Facet {
-  glm::vec3 place, normal;
+  glm::vec3 position, normal;
   float area;       // that it stands for; it counts as no more than a large one of the scene's
   float size;       // its middle standard deviation
   float luminance;  // 0…1
@@ -47,8 +47,9 @@ std::vector<Facet> sample_facets(const GaussianCloud& cloud, float stands_for,
   std::vector<Facet> facets;
   for (std::size_t k = 0; k < sample.size(); ++k) {
     const std::size_t i = sample[k];
-    const glm::vec3& place = cloud.mean[i];
-    if (glm::any(glm::lessThan(place, bounds.min)) || glm::any(glm::greaterThan(place, bounds.max)))
+    const glm::vec3& position = cloud.mean[i];
+    if (glm::any(glm::lessThan(position, bounds.min)) ||
+        glm::any(glm::greaterThan(position, bounds.max)))
       continue;
     const glm::vec3& scale = cloud.scale[i];
     std::array<int, 3> axes = {0, 1, 2};
@@ -56,7 +57,7 @@ std::vector<Facet> sample_facets(const GaussianCloud& cloud, float stands_for,
     const float area = std::min(scale[axes[1]], largest) * std::min(scale[axes[2]], largest);
     const glm::vec3 colour = glm::clamp(0.5f + sh_c0 * cloud.sh_of(i)[0], 0.0f, 1.0f);
     facets.push_back(
-        {place, glm::mat3_cast(cloud.rotation[i])[axes[0]],
+        {position, glm::mat3_cast(cloud.rotation[i])[axes[0]],
          two_pi * stands_for * static_cast<float>(sample.step()) * cloud.opacity[i] * area,
          std::sqrt(scale[axes[1]] * scale[axes[2]]),
          glm::dot(colour, glm::vec3(0.2126f, 0.7152f, 0.0722f)),  // BT.709
@@ -94,12 +95,12 @@ struct UprightBox {
   void measure(const std::vector<Facet>& facets, int k) {
     constexpr double tail = 0.02;
     constexpr std::size_t bins = 1024;
-    const auto place = [&](const Facet& f) { return glm::dot(f.place, axes[k]); };
-    const auto [first, last] = std::ranges::minmax(facets, {}, place);
-    const float least = place(first), bin = (place(last) - least) / bins;
+    const auto position = [&](const Facet& f) { return glm::dot(f.position, axes[k]); };
+    const auto [first, last] = std::ranges::minmax(facets, {}, position);
+    const float least = position(first), bin = (position(last) - least) / bins;
     std::array<double, bins + 1> area{};
     for (const Facet& f : facets)
-      area[bin > 0.0f ? static_cast<std::size_t>((place(f) - least) / bin) : 0] +=
+      area[bin > 0.0f ? static_cast<std::size_t>((position(f) - least) / bin) : 0] +=
           static_cast<double>(f.area);
     std::partial_sum(area.begin(), area.end(), area.begin());
     const auto quantile = [&](double share) {
@@ -111,8 +112,8 @@ struct UprightBox {
   }
 
   /// 0…1 in the box.
-  [[nodiscard]] glm::vec3 place_of(const Facet& facet) const {
-    return (facet.place * axes - low) / extent;
+  [[nodiscard]] glm::vec3 position_of(const Facet& facet) const {
+    return (facet.position * axes - low) / extent;
   }
 };
 
@@ -129,17 +130,17 @@ float covered(const std::vector<Facet>& facets, const UprightBox& box, bool belo
   const auto is_level = [&](const Facet& f) {
     return f.is_flat && std::abs(glm::dot(f.normal, box.axes[2])) > horizontal;
   };
-  const auto height_of = [&](const glm::vec3& place) {  // from the outside
-    return level_of(below ? place.z : 1.0f - place.z);
+  const auto height_of = [&](const glm::vec3& position) {  // from the outside
+    return level_of(below ? position.z : 1.0f - position.z);
   };
   std::array<float, levels> area{};
   for (const Facet& f : facets)
-    if (is_level(f)) area[static_cast<std::size_t>(height_of(box.place_of(f)))] += f.area;
+    if (is_level(f)) area[static_cast<std::size_t>(height_of(box.position_of(f)))] += f.area;
   const auto outer = area.begin() + static_cast<int>(outer_part * levels);
   const int floor = static_cast<int>(std::max_element(area.begin(), outer) - area.begin());
   std::vector<float> cells(plan * plan);
   for (const Facet& f : facets) {
-    const glm::vec3 p = box.place_of(f);
+    const glm::vec3 p = box.position_of(f);
     if (!is_level(f) || std::abs(height_of(p) - floor) > 1) continue;
     if (!(p.x >= 0.0f && p.x < 1.0f && p.y >= 0.0f && p.y < 1.0f)) continue;
     const glm::ivec2 cell = glm::min(glm::ivec2(static_cast<float>(plan) * glm::vec2(p)), plan - 1);
@@ -180,7 +181,7 @@ float uprightness(const std::vector<Facet>& facets, const UprightBox& box, float
   const float finest_area = fine * fine * box.extent.z * box.extent.z;
   Correlation things, detail, light;
   for (const Facet& f : facets) {
-    const glm::vec3 p = box.place_of(f);
+    const glm::vec3 p = box.position_of(f);
     if (glm::any(glm::greaterThan(glm::abs(p - 0.5f), glm::vec3(0.5f + edge)))) continue;
     const double height = static_cast<double>(2.0f * p.z - 1.0f),
                  area = static_cast<double>(f.area);

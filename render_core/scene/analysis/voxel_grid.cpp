@@ -42,12 +42,12 @@ void VoxelGrid::add_gaussian(const GaussianCloud& cloud, std::size_t i, float we
     return static_cast<int>(std::clamp(std::ceil(2.0f * s / cell_size_), 1.0f, 8.0f));
   };
   const int rows = points(scale[axes[0]]), columns = points(scale[axes[1]]);
-  const auto place = [](int k, int n) {  // -1.5…1.5 standard deviations, evenly
+  const auto point = [](int k, int n) {  // -1.5…1.5 standard deviations, evenly
     return 1.5f * (static_cast<float>(2 * k + 1) / static_cast<float>(n) - 1.0f);
   };
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column)
-      add(cloud.mean[i] + u * place(row, rows) + v * place(column, columns),
+      add(cloud.mean[i] + u * point(row, rows) + v * point(column, columns),
           area / static_cast<float>(rows * columns));
 }
 

@@ -34,8 +34,8 @@ bool in_range(const glm::vec3& v) {
                    "scale less, or move less far");
 }
 
-glm::vec3 place_in_range(const AffineMap& map, const glm::vec3& place) {
-  const glm::vec3 to(map(glm::dvec3(place)));
+glm::vec3 place_in_range(const AffineMap& map, const glm::vec3& point) {
+  const glm::vec3 to(map(glm::dvec3(point)));
   if (!in_range(to)) fail_out_of_range("a place of the scene's hints");
   return to;
 }

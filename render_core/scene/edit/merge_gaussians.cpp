@@ -112,7 +112,7 @@ float cost_of(const MergedSplat& a, const MergedSplat& b) {
 
 struct Partner {
   float error = 0.0f;
-  std::uint32_t place = 0;  // along the curve
+  std::uint32_t position = 0;  // along the curve
 };
 
 struct Pair {
@@ -133,7 +133,7 @@ class Round {
       for (std::size_t i = part * block; i < std::min(count, (part + 1) * block); ++i) body(i);
     });
   }
-  [[nodiscard]] Partner partner_of(std::size_t place) const;
+  [[nodiscard]] Partner partner_of(std::size_t position) const;
   [[nodiscard]] std::vector<Pair> cheapest_pairs(std::size_t most);
   void join(const Pair& pair);
 
@@ -153,12 +153,12 @@ Round::Round(GaussianCloud& cloud, ThreadPool& pool)
     middle += glm::dvec3(cloud.mean[i]) / count;
   }
   const double unit = std::max(size, 1e-30);
-  for_each(cloud.size(), [&](std::size_t place) {
-    const std::uint32_t i = order_[place];
+  for_each(cloud.size(), [&](std::size_t position) {
+    const std::uint32_t i = order_[position];
     const glm::quat& q = cloud_.rotation[i];
     const float rotation[4] = {q.x, q.y, q.z, q.w};
     const glm::vec3 scale(glm::dvec3(cloud_.scale[i]) / unit);
-    MergedSplat& splat = splats_[place];
+    MergedSplat& splat = splats_[position];
     splat.mean = glm::vec3((glm::dvec3(cloud_.mean[i]) - middle) / unit);
     splat.shape =
         covariance_of(math::covariance_factor<float>(rotation, {scale.x, scale.y, scale.z}));
@@ -170,19 +170,19 @@ Round::Round(GaussianCloud& cloud, ThreadPool& pool)
   });
 }
 
-Partner Round::partner_of(std::size_t place) const {
-  const MergedSplat& splat = splats_[place];
+Partner Round::partner_of(std::size_t position) const {
+  const MergedSplat& splat = splats_[position];
   std::array<std::pair<float, std::uint32_t>, compared> best;
   best.fill({std::numeric_limits<float>::infinity(), 0});
-  const std::size_t end = std::min(splats_.size(), place + 1 + next_on_curve);
-  for (std::size_t other = place + 1; other < end; ++other) {
+  const std::size_t end = std::min(splats_.size(), position + 1 + next_on_curve);
+  for (std::size_t other = position + 1; other < end; ++other) {
     const float cost = cost_of(splat, splats_[other]);
     if (!(cost < best.back().first)) continue;
     best.back() = {cost, static_cast<std::uint32_t>(other)};
     for (std::size_t k = compared - 1; k > 0 && best[k].first < best[k - 1].first; --k)
       std::swap(best[k], best[k - 1]);
   }
-  Partner partner{std::numeric_limits<float>::max(), static_cast<std::uint32_t>(place + 1)};
+  Partner partner{std::numeric_limits<float>::max(), static_cast<std::uint32_t>(position + 1)};
   for (const auto& [cost, other] : best) {
     if (cost == std::numeric_limits<float>::infinity()) break;
     const float error = error_of(splat, splats_[other]);
@@ -194,18 +194,18 @@ Partner Round::partner_of(std::size_t place) const {
 std::vector<Pair> Round::cheapest_pairs(std::size_t most) {
   const std::size_t count = splats_.size() - 1;  // the last one has none after it
   std::vector<Partner> partners(count);
-  for_each(count, [&](std::size_t place) { partners[place] = partner_of(place); });
+  for_each(count, [&](std::size_t position) { partners[position] = partner_of(position); });
   std::vector<CodedIndex> by_error(count), scratch(count);
   // Floats that are not negative compare as their bits do.
-  for (std::size_t place = 0; place < count; ++place)
-    by_error[place] = {std::bit_cast<std::uint32_t>(partners[place].error),
-                       static_cast<std::uint32_t>(place)};
+  for (std::size_t position = 0; position < count; ++position)
+    by_error[position] = {std::bit_cast<std::uint32_t>(partners[position].error),
+                          static_cast<std::uint32_t>(position)};
   RadixSorter().sort(by_error, scratch, 32, pool_);
   std::vector<bool> taken(splats_.size());
   std::vector<Pair> pairs;
   for (const CodedIndex& next : by_error) {
     if (pairs.size() == most) break;
-    const std::uint32_t other = partners[next.value].place;
+    const std::uint32_t other = partners[next.value].position;
     if (taken[next.value] || taken[other]) continue;
     taken[next.value] = taken[other] = true;
     pairs.push_back({order_[next.value], order_[other]});

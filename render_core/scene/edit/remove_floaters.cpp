@@ -36,7 +36,7 @@ class Cells {
   static constexpr auto occupied = static_cast<std::uint32_t>(occupied_depth / unit_depth);
   static constexpr std::uint32_t surface = occupied + 1, floating = occupied + 2;
 
-  [[nodiscard]] std::size_t index_of(const glm::vec3& place) const;
+  [[nodiscard]] std::size_t index_of(const glm::vec3& position) const;
   [[nodiscard]] glm::vec3 scale_in_cells(std::size_t gaussian) const;
   [[nodiscard]] bool is_large(std::size_t gaussian) const;
   template <class Visit>
@@ -65,8 +65,8 @@ Cells::Cells(const GaussianCloud& cloud, const Bounds& core, ThreadPool& pool)
   });
 }
 
-std::size_t Cells::index_of(const glm::vec3& place) const {
-  glm::vec3 at = (place - middle_) / half_;
+std::size_t Cells::index_of(const glm::vec3& position) const {
+  glm::vec3 at = (position - middle_) / half_;
   const float norm = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)});
   if (norm > 1.0f) at *= (2.0f - 1.0f / norm) / norm;
   std::size_t index = 0;

@@ -101,9 +101,9 @@ void use_orbit(const OrbitLimits& orbit, SceneHints& hints) {
 /// The same hints about another origin.
 void count_from(const glm::dvec3& origin, SceneHints& hints) {
   const glm::vec3 by(hints.origin - origin);
-  for (glm::vec3* place :
+  for (glm::vec3* point :
        {&hints.start_pose.position, &hints.limits.min, &hints.limits.max, &hints.focus})
-    *place += by;
+    *point += by;
   hints.origin = origin;
 }
 

@@ -36,10 +36,10 @@ glm::vec3 parse_up(const JsonField& field) {
 
 Sidecar::StartPose parse_start_pose(const JsonField& field, const glm::dvec3& origin) {
   Sidecar::StartPose pose;
-  pose.position = field.at("position").place(origin);
+  pose.position = field.at("position").position(origin);
   if (const auto target = field.find("look_at")) {
     if (field.find("orientation")) field.fail("has both 'look_at' and 'orientation'", "keep one");
-    pose.look_at = target->place(origin);
+    pose.look_at = target->position(origin);
     if (*pose.look_at == pose.position) target->fail("is the position itself");
   } else if (const auto orientation = field.find("orientation")) {
     pose.orientation = glm::quat(orientation->orientation());
@@ -50,7 +50,7 @@ Sidecar::StartPose parse_start_pose(const JsonField& field, const glm::dvec3& or
 }
 
 Bounds parse_limits(const JsonField& field, const glm::dvec3& origin) {
-  const Bounds limits{field.at("min").place(origin), field.at("max").place(origin)};
+  const Bounds limits{field.at("min").position(origin), field.at("max").position(origin)};
   for (int k = 0; k < 3; ++k)
     if (!(limits.min[k] < limits.max[k])) field.fail("'min' is not below 'max' on every axis");
   return limits;
@@ -117,7 +117,7 @@ Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin) {
       near->fail(fmt::format("is beyond {} units", max_coordinate));
   }
   if (const auto limits = root.find("limits")) sidecar.limits = parse_limits(*limits, origin);
-  if (const auto focus = root.find("focus")) sidecar.focus = focus->place(origin);
+  if (const auto focus = root.find("focus")) sidecar.focus = focus->position(origin);
   sidecar.about = parse_about(root);
   if (const auto model = root.find("model")) {
     sidecar.model = splat_model_named(model->text());
@@ -149,9 +149,9 @@ void note_origin(const glm::dvec3& origin, std::vector<std::string>& notes) {
         origin.x, origin.y, origin.z));
 }
 
-nlohmann::ordered_json json_place(const glm::vec3& place, const glm::dvec3& origin) {
-  if (origin == glm::dvec3(0.0)) return {place.x, place.y, place.z};
-  const glm::dvec3 in_file = glm::dvec3(place) + origin;
+nlohmann::ordered_json json_location(const glm::vec3& point, const glm::dvec3& origin) {
+  if (origin == glm::dvec3(0.0)) return {point.x, point.y, point.z};
+  const glm::dvec3 in_file = glm::dvec3(point) + origin;
   return {in_file.x, in_file.y, in_file.z};
 }
 
@@ -161,15 +161,15 @@ std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
 
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
                    const nlohmann::ordered_json* tours) {
-  const auto place = [&](const glm::vec3& p) { return json_place(p, hints.origin); };
+  const auto point = [&](const glm::vec3& p) { return json_location(p, hints.origin); };
   const glm::quat& q = hints.start_pose.orientation;
   nlohmann::ordered_json document = {
       {"up", {hints.up.x, hints.up.y, hints.up.z}},
       {"start_pose",
-       {{"position", place(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
+       {{"position", point(hints.start_pose.position)}, {"orientation", {q.x, q.y, q.z, q.w}}}},
       {"near", hints.near_z},
-      {"limits", {{"min", place(hints.limits.min)}, {"max", place(hints.limits.max)}}},
-      {"focus", place(hints.focus)}};
+      {"limits", {{"min", point(hints.limits.min)}, {"max", point(hints.limits.max)}}},
+      {"focus", point(hints.focus)}};
   const SceneAbout& about = hints.about;
   const auto add_said = [&](const char* name, const std::string& text) {
     if (!text.empty()) document[name] = text;

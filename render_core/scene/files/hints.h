@@ -86,7 +86,7 @@ bool tell_anything(const HintFiles& files);
 void note_origin(const glm::dvec3& origin, std::vector<std::string>& notes);
 
 /// A place about `origin`, as the files beside a scene have it.
-nlohmann::ordered_json json_place(const glm::vec3& place, const glm::dvec3& origin);
+nlohmann::ordered_json json_location(const glm::vec3& point, const glm::dvec3& origin);
 
 /// Nothing where there is no such file. Throws InputError for a faulty one.
 std::optional<Sidecar> sidecar_at(const HintFiles& files);

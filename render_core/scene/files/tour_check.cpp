@@ -129,10 +129,10 @@ void check_sound(const JsonField& sound, const MediaOrigins* origins) {
 }
 
 void check_view(const JsonField& view) {
-  static_cast<void>(view.at("position").place());
+  static_cast<void>(view.at("position").position());
   const auto target = view.find("look_at"), orientation = view.find("orientation");
   if (target)
-    static_cast<void>(target->place());
+    static_cast<void>(target->position());
   else if (orientation)
     static_cast<void>(orientation->orientation());
   else
@@ -181,7 +181,7 @@ void check_stop(const JsonField& stop, const MediaOrigins* origins) {
   check_text(stop.find("caption"));
   check_translations(stop, {"title", "caption"});
   check_view(stop);
-  if (const auto marker = stop.find("marker")) static_cast<void>(marker->place());
+  if (const auto marker = stop.find("marker")) static_cast<void>(marker->position());
   if (const auto portal = stop.find("portal")) check_portal(*portal);
   check_number(stop.find("stay_s"), 0.0f, longest_stay_s);
   check_number(stop.find("fly_s"), 0.0f, longest_flight_s);

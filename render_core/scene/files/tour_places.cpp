@@ -26,15 +26,15 @@ bool are_numbers(const nlohmann::ordered_json& value, std::size_t count) {
 void place_member(const std::string& name, nlohmann::ordered_json& value,
                   const Placement& placement, const glm::dvec3& origin) {
   const auto number = [&](std::size_t k) { return value[k].get<double>(); };
-  const bool is_place = name == "position" || name == "look_at" || name == "marker";
-  if (is_place && are_numbers(value, 3)) {
+  const bool is_position = name == "position" || name == "look_at" || name == "marker";
+  if (is_position && are_numbers(value, 3)) {
     const glm::dvec3 to = placement.map()({number(0), number(1), number(2)});
     for (int k = 0; k < 3; ++k)
       if (!(std::abs(to[k]) <= static_cast<double>(max_coordinate)))
         throw InputError("placement", "",
                          fmt::format("a place of a tour would lie beyond {} units", max_coordinate),
                          "scale less, or move less far");
-    value = json_place(glm::vec3(to - origin), origin);
+    value = json_location(glm::vec3(to - origin), origin);
   } else if (name == "orientation" && are_numbers(value, 4)) {
     const glm::quat to(placement.rotation * glm::dquat(number(3), number(0), number(1), number(2)));
     value = {to.x, to.y, to.z, to.w};

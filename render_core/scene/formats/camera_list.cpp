@@ -34,7 +34,7 @@ glm::quat orientation_of(const JsonField& field, const glm::mat3& rotation) {
 
 /// A 3DGS training's camera: position, and a 3x3 matrix from our camera axes.
 Pose training_pose(const JsonField& camera, const glm::dvec3& origin) {
-  const glm::vec3 position = camera.at("position").place(origin);
+  const glm::vec3 position = camera.at("position").position(origin);
   const JsonField rows = camera.at("rotation");
   if (rows.size() != 3) rows.fail("is not a 3x3 matrix");
   glm::mat3 rotation;
@@ -65,7 +65,7 @@ Pose opengl_pose(const JsonField& matrix, const glm::dvec3& origin) {
     for (int c = 0; c < 3; ++c) rotation[c][r] = c == 0 ? row[c] : -row[c];
     position[r] = row[3];
   }
-  return {matrix.as_place(position, origin), orientation_of(matrix, glm::mat3(rotation))};
+  return {matrix.as_position(position, origin), orientation_of(matrix, glm::mat3(rotation))};
 }
 
 /// A field of a camera, or of all cameras of the file, by the first of its names that is there.

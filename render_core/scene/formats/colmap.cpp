@@ -96,8 +96,8 @@ ListedCamera make_image(const std::string& file, const std::string& where, std::
   const glm::dquat rotation(pose[0], pose[1], pose[2], pose[3]);
   const double norm = glm::length(rotation);
   const bool turns = norm > 1e-6 && norm < 1e6;  // squares of larger numbers are infinite
-  const auto is_place = [](double p) { return std::abs(p) <= max_coordinate; };
-  if (!turns || !std::all_of(pose.begin() + 4, pose.end(), is_place)) {
+  const auto is_position = [](double p) { return std::abs(p) <= max_coordinate; };
+  if (!turns || !std::all_of(pose.begin() + 4, pose.end(), is_position)) {
     throw InputError(file, where, "its pose is not a rotation and a translation");
   }
   const glm::dquat world_from_camera = glm::conjugate(rotation / norm);

@@ -149,12 +149,13 @@ std::vector<float> GltfAccessor::read(std::size_t begin, std::size_t end) const 
   const auto& rows = sparse->rows;
   const auto first = std::ranges::lower_bound(rows, begin),
              last = std::ranges::lower_bound(rows, end);
-  const auto place = static_cast<std::size_t>(first - rows.begin());
+  const auto position = static_cast<std::size_t>(first - rows.begin());
   const std::vector<float> values =
-      sparse->values.read(place, static_cast<std::size_t>(last - rows.begin()));
+      sparse->values.read(position, static_cast<std::size_t>(last - rows.begin()));
   for (std::size_t i = 0; i * columns < values.size(); ++i)
-    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * columns), columns,
-                numbers.begin() + static_cast<std::ptrdiff_t>((rows[place + i] - begin) * columns));
+    std::copy_n(
+        values.begin() + static_cast<std::ptrdiff_t>(i * columns), columns,
+        numbers.begin() + static_cast<std::ptrdiff_t>((rows[position + i] - begin) * columns));
   return numbers;
 }
 

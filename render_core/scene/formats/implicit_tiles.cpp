@@ -23,14 +23,14 @@ constexpr std::uint64_t max_tiles_in_subtree = std::uint64_t{1} << 21;
 constexpr std::uint64_t max_levels = 30;  // coordinates have 32 bits
 
 /// A tile by its level and its place there.
-struct Place {
+struct Position {
   std::uint32_t level = 0;
   std::array<std::uint32_t, 3> at{};
 };
 
 /// The tile `levels` below, whose bits of each axis are interleaved in `morton`, x lowest.
-Place below(const Place& place, std::uint32_t levels, std::uint64_t morton, int axes) {
-  Place found{place.level + levels, place.at};
+Position below(const Position& position, std::uint32_t levels, std::uint64_t morton, int axes) {
+  Position found{position.level + levels, position.at};
   for (int k = 0; k < axes; ++k) {
     std::uint32_t& at = found.at[static_cast<std::size_t>(k)];
     at <<= levels;
@@ -43,15 +43,15 @@ Place below(const Place& place, std::uint32_t levels, std::uint64_t morton, int 
   return found;
 }
 
-std::string filled_in(std::string uri, const Place& place) {
+std::string filled_in(std::string uri, const Position& position) {
   const auto fill = [&](std::string_view name, std::uint32_t value) {
     for (std::size_t at; (at = uri.find(name)) != std::string::npos;)
       uri.replace(at, name.size(), std::to_string(value));
   };
-  fill("{level}", place.level);
-  fill("{x}", place.at[0]);
-  fill("{y}", place.at[1]);
-  fill("{z}", place.at[2]);
+  fill("{level}", position.level);
+  fill("{x}", position.at[0]);
+  fill("{y}", position.at[1]);
+  fill("{z}", position.at[2]);
   return uri;
 }
 
@@ -187,7 +187,7 @@ struct Open {
 };
 
 struct Waiting {
-  Place root;
+  Position root;
   std::optional<std::size_t> above;
 };
 
@@ -213,10 +213,10 @@ class Expansion {
     if (!subtree.tiles[first + morton]) return std::nullopt;
     if (tiles_.size() == most_) tile_.fail(fmt::format("stands for more than {} tiles", most_));
     ImplicitTile tile{above, {}};
-    const Place place = below(in.root, level, morton, scheme_.axes);
+    const Position position = below(in.root, level, morton, scheme_.axes);
     for (std::size_t i = 0; i < subtree.contents.size(); ++i)
       if (subtree.contents[i][first + morton])
-        tile.contents.push_back(filled_in(scheme_.content_uris[i], place));
+        tile.contents.push_back(filled_in(scheme_.content_uris[i], position));
     tiles_.push_back(std::move(tile));
     return Open{tiles_.size() - 1, morton};
   }

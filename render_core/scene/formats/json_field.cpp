@@ -151,7 +151,7 @@ glm::dvec3 JsonField::dvec3() const {
   return {v[0], v[1], v[2]};
 }
 
-glm::vec3 JsonField::as_place(const glm::dvec3& at, const glm::dvec3& origin) const {
+glm::vec3 JsonField::as_position(const glm::dvec3& at, const glm::dvec3& origin) const {
   for (int k = 0; k < 3; ++k)
     if (!(std::abs(at[k]) <= static_cast<double>(max_coordinate)))
       fail(fmt::format("is not a position in a scene: beyond {} units", max_coordinate));

@@ -45,12 +45,12 @@ class JsonField {
   [[nodiscard]] glm::vec3 vec3() const { return glm::vec3(dvec3()); }
   [[nodiscard]] glm::dvec3 dvec3() const;
   /// Three coordinates, at most max_coordinate from 0 on each axis. Returned about `origin`.
-  [[nodiscard]] glm::vec3 place(const glm::dvec3& origin = glm::dvec3(0.0)) const {
-    return as_place(dvec3(), origin);
+  [[nodiscard]] glm::vec3 position(const glm::dvec3& origin = glm::dvec3(0.0)) const {
+    return as_position(dvec3(), origin);
   }
   /// The place `at`, which this field stores in another form than place() reads.
-  [[nodiscard]] glm::vec3 as_place(const glm::dvec3& at,
-                                   const glm::dvec3& origin = glm::dvec3(0.0)) const;
+  [[nodiscard]] glm::vec3 as_position(const glm::dvec3& at,
+                                      const glm::dvec3& origin = glm::dvec3(0.0)) const;
   /// A unit quaternion x, y, z, w, to one percent; normalised.
   [[nodiscard]] glm::dquat orientation() const;
   /// The same for a quaternion that this field stores in another form.

@@ -203,8 +203,8 @@ struct RowReader {
     };
     for (int k = 0; k < 3; ++k) {
       const auto column = static_cast<std::size_t>(k);
-      const double place = plain ? static_cast<double>(number(column)) : place_of(row, i, k);
-      cloud.mean[to][k] = static_cast<float>(place - origin[k]);
+      const double position = plain ? static_cast<double>(number(column)) : position_of(row, i, k);
+      cloud.mean[to][k] = static_cast<float>(position - origin[k]);
       cloud.scale[to][k] = number(3 + column);
     }
     cloud.rotation[to] = unit(glm::quat(number(6), number(7), number(8), number(9)));
@@ -224,7 +224,7 @@ struct RowReader {
   }
 
  private:
-  [[nodiscard]] double place_of(const std::byte* row, std::size_t i, int k) const {
+  [[nodiscard]] double position_of(const std::byte* row, std::size_t i, int k) const {
     const double range = section.range;
     const double steps = static_cast<double>(load_as<std::uint16_t>(row + 2 * k)) - range;
     return steps * (0.5 * static_cast<double>(section.block_size) / range) +

@@ -46,8 +46,8 @@ struct Field {
 struct Layout {
   int sh_degree = 0;
   std::vector<Field> fields;
-  float colour_unit = 0.0f;            // of red, green, blue in place of f_dc; 0: there are f_dc
-  std::array<std::size_t, 3> place{};  // properties x, y, z
+  float colour_unit = 0.0f;               // of red, green, blue in place of f_dc; 0: there are f_dc
+  std::array<std::size_t, 3> position{};  // properties x, y, z
 };
 
 std::size_t require_property(const ByteSource& file, const PlyElement& vertex,
@@ -99,7 +99,7 @@ Layout find_fields(const ByteSource& file, const PlyElement& vertex) {
     layout.colour_unit = 1.0f / full_colour(vertex.find(colours[0])->type);
   for (std::size_t k = 0; k < 3; ++k) {
     add(at(offsetof(Row, mean)) + k, std::string(1, "xyz"[k]));
-    layout.place[k] = layout.fields.back().property;
+    layout.position[k] = layout.fields.back().property;
     add(at(offsetof(Row, dc)) + k, colours[k]);
     if (k < 2 || !is_of_surfels(vertex))
       add(at(offsetof(Row, log_scale)) + k, fmt::format("scale_{}", k));
@@ -168,7 +168,7 @@ double load_scalar(const std::byte* from, PlyType type, bool big_endian) {
 }
 
 /// Whether places are more exact than floats.
-bool has_precise_places(const PlyElement& vertex) {
+bool has_precise_positions(const PlyElement& vertex) {
   return std::ranges::any_of(std::array{"x", "y", "z"}, [&](const char* name) {
     const PlyProperty* property = vertex.find(name);
     return property && property->type != PlyType::f32;
@@ -195,13 +195,13 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
                 : static_cast<float>(load_scalar(from + p.offset, p.type, big_endian));
     }
   };
-  const auto place_of = [&](const std::byte* from) {
-    glm::dvec3 place;
+  const auto position_of = [&](const std::byte* from) {
+    glm::dvec3 position;
     for (int k = 0; k < 3; ++k) {
-      const PlyProperty& p = vertex.properties[layout.place[static_cast<std::size_t>(k)]];
-      place[k] = load_scalar(from + p.offset, p.type, big_endian);
+      const PlyProperty& p = vertex.properties[layout.position[static_cast<std::size_t>(k)]];
+      position[k] = load_scalar(from + p.offset, p.type, big_endian);
     }
-    return place;
+    return position;
   };
   const bool moves = origin != glm::dvec3(0.0);
   context.for_blocks(cloud.size(), block_rows(vertex.row_bytes),
@@ -213,7 +213,7 @@ void read_binary(const ByteSource& file, const PlyElement& vertex, const Layout&
                          const std::byte* from = bytes.data() + (i - begin) * vertex.row_bytes;
                          decode_row(from, fields.data());
                          store(std::bit_cast<Row>(fields), layout, cloud, i);
-                         if (moves) cloud.mean[i] = glm::vec3(place_of(from) - origin);
+                         if (moves) cloud.mean[i] = glm::vec3(position_of(from) - origin);
                        }
                      });
 }
@@ -275,7 +275,7 @@ void read_ascii(const ByteSource& file, const PlyHeader& header, const PlyElemen
   std::array<float, row_fields> fields{};
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     for (double& value : values) value = numbers.next();
-    for (int k = 0; k < 3; ++k) values[layout.place[static_cast<std::size_t>(k)]] -= origin[k];
+    for (int k = 0; k < 3; ++k) values[layout.position[static_cast<std::size_t>(k)]] -= origin[k];
     for (const Field& f : layout.fields)
       fields[f.destination] = static_cast<float>(values[f.property]);
     store(std::bit_cast<Row>(fields), layout, cloud, i);
@@ -364,7 +364,7 @@ DecodedScene read_any_ply(const SceneFiles& files, const LoadContext& context) {
   };
   const PlyElement* vertex = header.find("vertex");
   if (header.encoding == PlyEncoding::ascii) return read_about_origin(read);
-  if (!vertex || !has_precise_places(*vertex)) return read(glm::dvec3(0.0));
+  if (!vertex || !has_precise_positions(*vertex)) return read(glm::dvec3(0.0));
   require_rows_in_file(file, *vertex);
   const FileRows sample = even_sample(vertex->count);
   const glm::dvec3 origin =

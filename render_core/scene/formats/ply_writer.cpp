@@ -44,8 +44,9 @@ void write_ply(const GaussianCloud& cloud, std::ostream& to, const glm::dvec3& o
       const glm::vec3 *sh = cloud.sh_of(i), log_scale = log(cloud.scale[i]);
       const glm::quat& q = cloud.rotation[i];
       if (precise) {
-        const auto place = std::bit_cast<std::array<float, 6>>(glm::dvec3(cloud.mean[i]) + origin);
-        out = std::ranges::copy(place, out).out;
+        const auto position =
+            std::bit_cast<std::array<float, 6>>(glm::dvec3(cloud.mean[i]) + origin);
+        out = std::ranges::copy(position, out).out;
       } else {
         for (int k = 0; k < 3; ++k) *out++ = cloud.mean[i][k];
       }

@@ -11,7 +11,7 @@ std::shared_ptr<const FileSet> SceneFiles::open(std::string_view only) const {
 }
 
 FileRows even_sample(std::uint64_t rows) {
-  const std::uint64_t step = (rows + most_origin_places - 1) / most_origin_places;
+  const std::uint64_t step = (rows + most_origin_positions - 1) / most_origin_positions;
   return {0, step == 0 ? 0 : (rows + step - 1) / step, step};
 }
 

@@ -70,7 +70,7 @@ DecodedScene read_about_origin(const Read& read) {
 
 /// A scene that is read part by part, not sanitized.
 struct DecodedParts {
-  static constexpr std::uint64_t most_sampled = most_origin_places;  // as robust_bounds() uses
+  static constexpr std::uint64_t most_sampled = most_origin_positions;  // as robust_bounds() uses
 
   std::string format;       // as Scene::format
   std::uint64_t count = 0;  // of the parts

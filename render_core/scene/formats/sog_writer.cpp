@@ -22,7 +22,7 @@
 #include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/palette.h"
 #include "render_core/scene/formats/sog.h"
-#include "render_core/scene/formats/stored_places.h"
+#include "render_core/scene/formats/stored_positions.h"
 #include "render_core/scene/formats/zip_writer.h"
 
 namespace catgs {
@@ -100,7 +100,7 @@ Codebook codebook_of(std::size_t count, const TripleOf& triple_of) {
 
 double log_mean(double v) { return std::copysign(std::log1p(std::abs(v)), v); }
 
-StoredPlaces stored_places(const GaussianCloud& cloud) {
+StoredPositions stored_positions(const GaussianCloud& cloud) {
   return {cloud, [](float v) { return static_cast<float>(log_mean(v)); }, mean_steps};
 }
 
@@ -108,7 +108,7 @@ class Writer {
  public:
   Writer(const GaussianCloud& cloud, ThreadPool& pool)
       : cloud_(cloud),
-        places_(stored_places(cloud)),
+        positions_(stored_positions(cloud)),
         pool_(pool),
         order_(morton_order(cloud.mean, pool)) {
     const double side = std::sqrt(static_cast<double>(cloud.size()));
@@ -168,7 +168,7 @@ class Writer {
     std::vector<glm::dvec3> logarithms(cloud_.size());
     glm::dvec3 low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
     for (std::size_t i = 0; i < cloud_.size(); ++i) {
-      const glm::dvec3 m(places_.mean()[i]);
+      const glm::dvec3 m(positions_.mean()[i]);
       logarithms[i] = {log_mean(m.x), log_mean(m.y), log_mean(m.z)};
       low = glm::min(low, logarithms[i]);
       high = glm::max(high, logarithms[i]);
@@ -208,7 +208,7 @@ class Writer {
   }
 
   void scales() {
-    const auto log_scale = [&](std::size_t i, int k) { return std::log(places_.scale()[i][k]); };
+    const auto log_scale = [&](std::size_t i, int k) { return std::log(positions_.scale()[i][k]); };
     const Codebook book = codebook_of(cloud_.size(), [&](std::size_t i) {
       return glm::vec3(log_scale(i, 0), log_scale(i, 1), log_scale(i, 2));
     });
@@ -259,7 +259,7 @@ class Writer {
   }
 
   const GaussianCloud& cloud_;
-  const StoredPlaces places_;
+  const StoredPositions positions_;
   ThreadPool& pool_;
   std::vector<std::uint32_t> order_;  // of the texels
   std::size_t width_ = 0, height_ = 0;
@@ -271,14 +271,14 @@ class Writer {
 
 std::vector<std::string> sog_losses(const GaussianCloud& cloud) {
   glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  const StoredPlaces places = stored_places(cloud);
-  for (const glm::vec3& m : places.mean()) {
+  const StoredPositions points = stored_positions(cloud);
+  for (const glm::vec3& m : points.mean()) {
     const glm::vec3 logarithm(glm::dvec3(log_mean(m.x), log_mean(m.y), log_mean(m.z)));
     low = glm::min(low, logarithm);
     high = glm::max(high, logarithm);
   }
   Losses losses(cloud);
-  losses.moved(places.mean());
+  losses.moved(points.mean());
   losses.positions([steps = (high - low) / mean_steps](const glm::vec3& mean) {
     const glm::vec3 at = steps * (1.0f + glm::abs(mean));
     return std::max({at.x, at.y, at.z});

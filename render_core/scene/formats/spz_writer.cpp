@@ -16,7 +16,7 @@
 #include "render_core/scene/formats/losses.h"
 #include "render_core/scene/formats/spz.h"
 #include "render_core/scene/formats/spz_format.h"
-#include "render_core/scene/formats/stored_places.h"
+#include "render_core/scene/formats/stored_positions.h"
 
 namespace catgs {
 
@@ -68,16 +68,16 @@ class GzipWriter {
   std::vector<char> buffer_ = std::vector<char>(256 * 1024);
 };
 
-StoredPlaces stored_places(const GaussianCloud& cloud) {
+StoredPositions stored_positions(const GaussianCloud& cloud) {
   return {cloud, [](float coordinate) { return coordinate; }, 1 << (position_bits + 1)};
 }
 
-int fractional_bits_for(const StoredPlaces& places) {
+int fractional_bits_for(const StoredPositions& points) {
   float largest = 0.0f;
-  for (const glm::vec3& m : places.mean())
+  for (const glm::vec3& m : points.mean())
     largest = std::max({largest, std::abs(m.x), std::abs(m.y), std::abs(m.z)});
   std::vector<float> sizes;
-  for (const glm::vec3& scale : places.scale()) sizes.push_back(middle_scale(scale));
+  for (const glm::vec3& scale : points.scale()) sizes.push_back(middle_scale(scale));
   const auto median = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::ranges::nth_element(sizes, median);
   int bits = usual_fractional_bits;
@@ -126,9 +126,9 @@ char quantised_sh(float value, int bits) {
 
 std::vector<std::string> spz_losses(const GaussianCloud& cloud) {
   Losses losses(cloud);
-  const StoredPlaces places = stored_places(cloud);
-  losses.moved(places.mean());
-  const float step = std::ldexp(1.0f, -fractional_bits_for(places));
+  const StoredPositions points = stored_positions(cloud);
+  losses.moved(points.mean());
+  const float step = std::ldexp(1.0f, -fractional_bits_for(points));
   losses.positions([step](const glm::vec3&) { return step; });
   const float half_step = 0.5f / log_scale_steps;
   losses.scales(std::exp(least_log_scale - half_step),
@@ -142,8 +142,8 @@ std::vector<std::string> spz_losses(const GaussianCloud& cloud) {
 
 void write_spz(const GaussianCloud& cloud, std::ostream& to) {
   const AxisFlip flip(right_up_back);
-  const StoredPlaces places = stored_places(cloud);
-  const int fractional_bits = fractional_bits_for(places);
+  const StoredPositions points = stored_positions(cloud);
+  const int fractional_bits = fractional_bits_for(points);
   GzipWriter gzip(to);
 
   std::string header(gzip_header_bytes, '\0');
@@ -168,7 +168,7 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
     out.push_back(static_cast<char>(to_byte(value)));
   };
   write_attribute([&](std::string& out, std::size_t i) {
-    const glm::vec3 mean = flip.mean(places.mean()[i]);
+    const glm::vec3 mean = flip.mean(points.mean()[i]);
     for (int k = 0; k < 3; ++k) append_fixed24(out, mean[k], fractional_bits);
   });
   write_attribute(
@@ -179,7 +179,7 @@ void write_spz(const GaussianCloud& cloud, std::ostream& to) {
   });
   write_attribute([&](std::string& out, std::size_t i) {
     for (int k = 0; k < 3; ++k)
-      append_byte(out, log_scale_steps * (std::log(places.scale()[i][k]) - least_log_scale));
+      append_byte(out, log_scale_steps * (std::log(points.scale()[i][k]) - least_log_scale));
   });
   write_attribute([&](std::string& out, std::size_t i) {
     append_smallest_three(out, flip.rotation(cloud.rotation[i]));

@@ -144,11 +144,11 @@ Grouping::Grouping(const Members& members)
   constexpr double farthest = 1e15;
   for (int i = 0; i < count_; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const glm::dvec3 place =
+    const glm::dvec3 position =
         glm::clamp((glm::dvec3(members.cloud.mean[at]) - middle) / size, -farthest, farthest);
     const glm::vec3& base = *members.cloud.sh_of(at);
     for (int k = 0; k < 3; ++k) {
-      features_[k][i] = static_cast<float>(place[k]);
+      features_[k][i] = static_cast<float>(position[k]);
       features_[4 + k][i] = colour_reach * sh_c0 * base[k];
     }
     variance_[i] /= size * size;

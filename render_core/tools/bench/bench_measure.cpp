@@ -43,11 +43,11 @@ std::vector<Measurement::Frame> time_path(const RenderSetup& setup, const ViewSe
 
 /// See Measurement::sharp_ms.
 std::vector<double> time_rests(const RenderSetup& setup, const ViewSettings& settings) {
-  constexpr std::size_t places = 8;
+  constexpr std::size_t positions = 8;
   const auto view = setup.made.renderer->make_view(settings);
   std::vector<double> times;
-  for (std::size_t place = 0; place < std::min(places, setup.poses.size()); ++place) {
-    FrameRequest request = setup.request(place * setup.poses.size() / places);
+  for (std::size_t position = 0; position < std::min(positions, setup.poses.size()); ++position) {
+    FrameRequest request = setup.request(position * setup.poses.size() / positions);
     request.waits_for_pages = false;
     const auto arrival = Clock::now();
     FrameView frame;

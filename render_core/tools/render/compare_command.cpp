@@ -154,9 +154,9 @@ double report_folders(const CompareOptions& options) {
   if (options.json) {
     nlohmann::ordered_json json;
     for (const NamedQuality& one : all) {
-      nlohmann::ordered_json& place =
+      nlohmann::ordered_json& position =
           &one == &all.back() ? json["mean"] : json["per_view"][one.name];
-      place = {{"psnr_db", one.psnr}, {"ssim", one.ssim}};
+      position = {{"psnr_db", one.psnr}, {"ssim", one.ssim}};
     }
     json["left_out"] = left_out;
     json["cameras_differ"] = cameras.json();

@@ -63,7 +63,7 @@ float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
 void print_map(const walk::WalkMap& map, std::uint64_t file_bytes) {
   const glm::vec2 size = glm::vec2(map.size) * map.grid.cell;
   fmt::print("{:.1f} x {:.1f} units, {} x {} columns, {} points, {:.1f} kB; north is {}\n", size.x,
-             size.y, map.size.x, map.size.y, map.places.size(),
+             size.y, map.size.x, map.size.y, map.positions.size(),
              1e-3 * static_cast<double>(file_bytes), walk::north_of(map.grid));
   for (std::size_t k = 0; k < map.storeys.size(); ++k) {
     const walk::Storey& storey = map.storeys[k];

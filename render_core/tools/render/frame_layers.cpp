@@ -49,7 +49,7 @@ LayerRenderer::LayerRenderer(const GaussianCloud& cloud, bool alpha, bool depth,
   }
   extent_ = glm::max(high - low_, glm::vec3(1e-6f));
   for (std::size_t i = 0; i < cloud.size(); ++i) colours[i] = (cloud.mean[i] - low_) / extent_;
-  places_ = recolour(cloud, colours, pool);
+  positions_ = recolour(cloud, colours, pool);
 }
 
 FrameLayers LayerRenderer::render(const Camera& camera) {
@@ -58,15 +58,15 @@ FrameLayers LayerRenderer::render(const Camera& camera) {
   FrameLayers layers;
   for (std::size_t i = 0; alpha_ && i < white.rgb.size(); i += 3)
     layers.alpha.push_back(white.rgb[i]);
-  if (!places_.view) return layers;
-  const Image places = draw(*places_.view, camera);
+  if (!positions_.view) return layers;
+  const Image positions = draw(*positions_.view, camera);
   const Pose& pose = camera.world_from_camera;
   const glm::vec3 forward = pose.orientation * glm::vec3(0.0f, 0.0f, 1.0f);
-  for (std::size_t i = 0; i < places.rgb.size(); i += 3) {
-    const glm::vec3 sum(places.rgb[i], places.rgb[i + 1], places.rgb[i + 2]);
+  for (std::size_t i = 0; i < positions.rgb.size(); i += 3) {
+    const glm::vec3 sum(positions.rgb[i], positions.rgb[i + 1], positions.rgb[i + 2]);
     const float weight = white.rgb[i];
-    const glm::vec3 place = low_ + sum / std::max(weight, seen) * extent_;
-    layers.depth.push_back(weight < seen ? 0.0f : glm::dot(forward, place - pose.position));
+    const glm::vec3 point = low_ + sum / std::max(weight, seen) * extent_;
+    layers.depth.push_back(weight < seen ? 0.0f : glm::dot(forward, point - pose.position));
   }
   return layers;
 }

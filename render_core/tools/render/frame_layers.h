@@ -36,7 +36,7 @@ class LayerRenderer {
                              const std::shared_ptr<ThreadPool>& pool);
 
   bool alpha_;
-  Recoloured white_, places_;  // the second is empty without depth
+  Recoloured white_, positions_;  // the second is empty without depth
   glm::vec3 low_{0.0f};
   glm::vec3 extent_{1.0f};  // a place is low_ + colour * extent_
 };

@@ -56,7 +56,7 @@ Json describe(const Scene& scene, double load_ms) {
   const SanitizeReport& report = scene.report;
   const SceneHints& hints = scene.hints;
   const glm::quat& q = hints.start_pose.orientation;
-  const auto place = [&](const glm::vec3& p) { return json_place(p, hints.origin); };
+  const auto position = [&](const glm::vec3& p) { return json_location(p, hints.origin); };
   const auto largest = [&](std::size_t i) {
     return std::max({cloud.scale[i].x, cloud.scale[i].y, cloud.scale[i].z});
   };
@@ -65,39 +65,40 @@ Json describe(const Scene& scene, double load_ms) {
   };
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  return {{"name", scene.name},
-          {"format", scene.format},
-          {"gaussians", cloud.size()},
-          {"model", name_of(cloud.model)},
-          {"sh_degree", cloud.sh_degree},
-          {"bytes", cloud.bytes()},
-          {"robust_bounds", {{"min", place(bounds.min)}, {"max", place(bounds.max)}}},
-          {"origin", {hints.origin.x, hints.origin.y, hints.origin.z}},
-          {"opacity", quantiles(cloud, [&](std::size_t i) { return cloud.opacity[i]; })},
-          {"largest_scale", quantiles(cloud, largest)},
-          {"flatness", quantiles(cloud, [&](std::size_t i) { return largest(i) / smallest(i); })},
-          {"sanitize",
-           {{"read", report.read},
-            {"dropped", report.dropped},
-            {"not_finite", report.not_finite},
-            {"invisible", report.invisible},
-            {"absurd", report.absurd},
-            {"repaired", report.repaired},
-            {"zero_rotations", report.zero_rotations},
-            {"clamped", report.clamped},
-            {"zeroed_sh", report.zeroed_sh}}},
-          {"hints",
-           {{"source", hints.source},
-            {"up", triple(hints.up)},
-            {"start_position", place(hints.start_pose.position)},
-            {"start_orientation_xyzw", {q.x, q.y, q.z, q.w}},
-            {"focus", place(hints.focus)},
-            {"near", hints.near_z},
-            {"scale", hints.scale},
-            {"limits", {{"min", place(hints.limits.min)}, {"max", place(hints.limits.max)}}}}},
-          {"notes", scene.notes},
-          {"load_ms", load_ms},
-          {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
+  return {
+      {"name", scene.name},
+      {"format", scene.format},
+      {"gaussians", cloud.size()},
+      {"model", name_of(cloud.model)},
+      {"sh_degree", cloud.sh_degree},
+      {"bytes", cloud.bytes()},
+      {"robust_bounds", {{"min", position(bounds.min)}, {"max", position(bounds.max)}}},
+      {"origin", {hints.origin.x, hints.origin.y, hints.origin.z}},
+      {"opacity", quantiles(cloud, [&](std::size_t i) { return cloud.opacity[i]; })},
+      {"largest_scale", quantiles(cloud, largest)},
+      {"flatness", quantiles(cloud, [&](std::size_t i) { return largest(i) / smallest(i); })},
+      {"sanitize",
+       {{"read", report.read},
+        {"dropped", report.dropped},
+        {"not_finite", report.not_finite},
+        {"invisible", report.invisible},
+        {"absurd", report.absurd},
+        {"repaired", report.repaired},
+        {"zero_rotations", report.zero_rotations},
+        {"clamped", report.clamped},
+        {"zeroed_sh", report.zeroed_sh}}},
+      {"hints",
+       {{"source", hints.source},
+        {"up", triple(hints.up)},
+        {"start_position", position(hints.start_pose.position)},
+        {"start_orientation_xyzw", {q.x, q.y, q.z, q.w}},
+        {"focus", position(hints.focus)},
+        {"near", hints.near_z},
+        {"scale", hints.scale},
+        {"limits", {{"min", position(hints.limits.min)}, {"max", position(hints.limits.max)}}}}},
+      {"notes", scene.notes},
+      {"load_ms", load_ms},
+      {"peak_rss_bytes", static_cast<std::int64_t>(usage.ru_maxrss) * 1024}};
 }
 
 std::string point(const Json& v) {

@@ -57,7 +57,7 @@ nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const Tr
                       {"mean_error", level.mean_error},
                       {"max_error", level.max_error}});
   }
-  const auto place = [&](const glm::vec3& p) { return json_place(p, header.origin); };
+  const auto position = [&](const glm::vec3& p) { return json_location(p, header.origin); };
   return {
       {"name", path.stem().string()},
       {"format", "tree"},
@@ -67,7 +67,7 @@ nlohmann::ordered_json describe_tree(const std::filesystem::path& path, const Tr
       {"sh_degree", header.sh_degree},
       {"read", header.read},
       {"dropped", header.dropped},
-      {"bounds", {{"min", place(header.low)}, {"max", place(header.high)}}},
+      {"bounds", {{"min", position(header.low)}, {"max", position(header.high)}}},
       {"origin", {header.origin.x, header.origin.y, header.origin.z}},
       {"bytes", bytes},
       {"bytes_per_gaussian", static_cast<double>(bytes) / static_cast<double>(header.gaussians)},

@@ -17,12 +17,12 @@
 namespace catgs::fuzz {
 namespace {
 
-bool is_place(const glm::vec3& v) {
+bool is_position(const glm::vec3& v) {
   return std::abs(v.x) <= 1e9f && std::abs(v.y) <= 1e9f && std::abs(v.z) <= 1e9f;
 }
 
 void require_sound(const Pose& pose) {
-  require(is_place(pose.position), "positions are places");
+  require(is_position(pose.position), "positions are places");
   require(std::abs(glm::length(pose.orientation) - 1.0f) < 1e-3f, "orientations have length 1");
 }
 
@@ -66,8 +66,8 @@ void parse_sidecar(Bytes input) {
   if (sidecar.near_z)
     require(*sidecar.near_z > 0.0f && *sidecar.near_z <= 1e9f, "near is in front of the camera");
   if (sidecar.limits)
-    require(is_place(sidecar.limits->min) && is_place(sidecar.limits->max), "limits are places");
-  if (sidecar.focus) require(is_place(*sidecar.focus), "the focus is a place");
+    require(is_position(sidecar.limits->min) && is_position(sidecar.limits->max), "limits are places");
+  if (sidecar.focus) require(is_position(*sidecar.focus), "the focus is a place");
   const SceneAbout& about = sidecar.about;
   for (const std::string& text : {about.title, about.credits, about.licence})
     require(printable(text) == text, "texts for visitors are printable");

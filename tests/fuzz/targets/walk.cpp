@@ -12,7 +12,7 @@ namespace catgs::fuzz {
 namespace {
 
 void require_clear(const walk::WalkMap& map, const walk::Stand& stand) {
-  require(map.clear_at(glm::ivec2(glm::floor(stand.place)), stand.height) != nullptr,
+  require(map.clear_at(glm::ivec2(glm::floor(stand.position)), stand.height) != nullptr,
           "a walker stands on clear ground");
 }
 
@@ -43,8 +43,8 @@ void parse_walk(Bytes input) {
   }
   for (const walk::Stand& turn : walk::find_path(map, map.start, at)) require_clear(map, turn);
   const std::string again = walk::pack(map);
-  require(walk::read_walk_file(MemorySource("again", std::as_bytes(std::span(again)))).places ==
-              map.places,
+  require(walk::read_walk_file(MemorySource("again", std::as_bytes(std::span(again)))).positions ==
+              map.positions,
           "what is read can be written");
 }
 
@@ -59,7 +59,7 @@ std::map<std::string, std::string> walk_seeds() {
     return input;
   };
   walk::WalkMap storeys = test::hand_made_map({4, 3}, [](int, int) { return Kind::clear; });
-  storeys.places.push_back({800, Kind::clear});
+  storeys.positions.push_back({800, Kind::clear});
   ++storeys.first.back();
   storeys.storeys = {{0.0f, 10.0f, 12}, {40.0f, 50.0f, 1}};
   return {

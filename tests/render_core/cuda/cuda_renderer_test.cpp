@@ -281,13 +281,13 @@ TEST_F(CudaRenderer, TheRestOfARoundAddsNoMoreThanItsBound) {
     GaussianCloud cloud;
     cloud.resize(static_cast<std::size_t>(before) + 2 + 40, 0);
     for (int i = 0; i < static_cast<int>(cloud.size()); ++i) {
-      const int place = i - before;
+      const int point = i - before;
       cloud.mean[i] = {0.0f, 0.0f, 5.0f + 1e-2f * static_cast<float>(i)};
       cloud.scale[i] = glm::vec3(40.0f, 40.0f, 1e-3f);  // as good as constant over the picture
       cloud.rotation[i] = glm::quat(1.0f, 0.0f, 0.0f, 0.0f);
       // Beside what stands before: 0.1 * 0.09 = 0.009 is left, of which the next leaves 0.00009.
-      cloud.opacity[i] = place < 0 ? 1.1f / 255.0f : place == 0 ? 0.9f : place == 1 ? 0.91f : 1.0f;
-      cloud.sh[i] = glm::vec3(place < 2 ? -1.7f : 1.7f);
+      cloud.opacity[i] = point < 0 ? 1.1f / 255.0f : point == 0 ? 0.9f : point == 1 ? 0.91f : 1.0f;
+      cloud.sh[i] = glm::vec3(point < 2 ? -1.7f : 1.7f);
     }
     TestScene scene;
     scene.cloud = std::make_shared<const GaussianCloud>(std::move(cloud));

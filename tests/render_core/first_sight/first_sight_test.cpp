@@ -181,8 +181,8 @@ TEST(FirstSight, AnyCloudHasAView) {
     sanitize(cloud, LoadContext(pool));
     if (cloud.empty()) continue;
     const SceneHints hints = estimate(cloud, find_up(cloud, {}));
-    const glm::vec3 place = hints.start_pose.position;
-    EXPECT_TRUE(std::isfinite(place.x + place.y + place.z)) << k;
+    const glm::vec3 point = hints.start_pose.position;
+    EXPECT_TRUE(std::isfinite(point.x + point.y + point.z)) << k;
     EXPECT_NEAR(glm::length(hints.start_pose.orientation), 1.0f, 1e-3f) << k;
     EXPECT_GT(hints.near_z, 0.0f) << k;
     EXPECT_GT(hints.scale, 0.0f) << k;

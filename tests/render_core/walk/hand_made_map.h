@@ -18,8 +18,8 @@ inline walk::WalkMap hand_made_map(const glm::ivec2& size,
   map.first.push_back(0);
   for (int y = 0; y < size.y; ++y)
     for (int x = 0; x < size.x; ++x) {
-      if (kind(x, y) <= walk::Kind::obstacle) map.places.push_back({160, kind(x, y)});
-      map.first.push_back(static_cast<std::uint32_t>(map.places.size()));
+      if (kind(x, y) <= walk::Kind::obstacle) map.positions.push_back({160, kind(x, y)});
+      map.first.push_back(static_cast<std::uint32_t>(map.positions.size()));
     }
   map.start = {glm::vec2(0.5f), 10.0f};
   map.storeys = walk::find_storeys(map);

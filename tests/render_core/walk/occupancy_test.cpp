@@ -10,9 +10,9 @@ namespace {
 
 const Grid grid = grid_around({0, 0, 0}, {0, 0, 1}, test::eye_m);
 
-std::vector<walk::Run> runs_at(const Occupancy& occupancy, const glm::vec3& place) {
+std::vector<walk::Run> runs_at(const Occupancy& occupancy, const glm::vec3& position) {
   std::vector<walk::Run> runs;
-  occupancy.append_runs(glm::ivec2(grid.from_world(place)), runs);
+  occupancy.append_runs(glm::ivec2(grid.from_world(position)), runs);
   return runs;
 }
 

@@ -49,7 +49,7 @@ TEST(WalkFile, KeepsAMap) {
   const WalkMap back = read(pack(map));
   EXPECT_EQ(back.size, map.size);
   EXPECT_EQ(back.first, map.first);
-  EXPECT_EQ(back.places, map.places);
+  EXPECT_EQ(back.positions, map.positions);
   EXPECT_EQ(back.grid.axes, map.grid.axes);
   EXPECT_EQ(back.grid.origin, map.grid.origin);
   EXPECT_EQ(back.start.height, map.start.height);
@@ -62,7 +62,7 @@ TEST(WalkFile, KeepsTheOriginOfTheScene) {
   map.origin = {500123.0, 5412345.0, 431.0};
   const std::string bytes = pack(map);
   EXPECT_EQ(read(bytes).origin, map.origin);
-  EXPECT_EQ(read(bytes).places, map.places);
+  EXPECT_EQ(read(bytes).positions, map.positions);
   std::string changed = bytes;
   const double nowhere = 1e10;
   std::memcpy(changed.data() + 320, &nowhere, sizeof nowhere);
@@ -81,23 +81,23 @@ TEST(WalkFile, KeepsAMapOfManyTiles) {
     return x < 64 && y < 64 ? Kind{9} : static_cast<Kind>((x + 3 * y) % 4);
   });
   WalkMap there = map;
-  there.start.place = {64.5f, 0.5f};
+  there.start.position = {64.5f, 0.5f};
   EXPECT_TRUE(tiles_of(map)[0].empty());
   EXPECT_EQ(tiles_of(map).size(), 6u);
   const WalkMap back = read(pack(there));
   EXPECT_EQ(back.first, map.first);
-  EXPECT_EQ(back.places, map.places);
+  EXPECT_EQ(back.positions, map.positions);
 }
 
 TEST(WalkFile, ARoomTakesFewBytes) {
   const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
-  EXPECT_GT(map.places.size(), 4000u);
+  EXPECT_GT(map.positions.size(), 4000u);
   EXPECT_LT(pack(map).size(), 4000u);
 }
 
 TEST(WalkFile, CutOffOrChangedFilesAreRefused) {
   const std::string whole = pack(test::hand_made_map({3, 2}, [](int, int) { return Kind::clear; }));
-  EXPECT_EQ(read(whole).places.size(), 6u);
+  EXPECT_EQ(read(whole).positions.size(), 6u);
   for (std::size_t size = 0; size < whole.size(); ++size) refused_field(whole.substr(0, size));
   for (std::size_t k = 0; k < whole.size(); ++k) {
     std::string changed = whole;
@@ -164,10 +164,10 @@ TEST(WalkFile, BytesBehindATileAreRefused) {
 TEST(WalkFile, NoMoreIsUnpackedThanDeflateCanMake) {
   std::string bytes = with(112, 1u << 24);
   EXPECT_EQ(refused_field(bytes), "places");
-  const std::uint32_t side = 64, places = 64 * 4096, unpacked = 4096 * 257;
+  const std::uint32_t side = 64, positions = 64 * 4096, unpacked = 4096 * 257;
   std::memcpy(bytes.data() + 104, &side, 4);
   std::memcpy(bytes.data() + 108, &side, 4);
-  std::memcpy(bytes.data() + 112, &places, 4);
+  std::memcpy(bytes.data() + 112, &positions, 4);
   test::seal(bytes);
   EXPECT_EQ(refused_field(bytes), "places");
   std::memcpy(bytes.data() + 324, &unpacked, 4);

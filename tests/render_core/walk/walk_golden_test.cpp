@@ -22,7 +22,7 @@ std::string hex(std::string_view bytes) {
   return text;
 }
 
-json of(const Stand& at) { return {at.place.x, at.place.y, at.height}; }
+json of(const Stand& at) { return {at.position.x, at.position.y, at.height}; }
 
 /// Stairs up to a floor, beside a wall with a gap.
 WalkMap map() {
@@ -35,7 +35,7 @@ WalkMap map() {
 float length_of(const std::vector<Stand>& path) {
   float length = 0.0f;
   for (std::size_t k = 1; k < path.size(); ++k)
-    length += glm::distance(path[k - 1].place, path[k].place);
+    length += glm::distance(path[k - 1].position, path[k].position);
   return length;
 }
 
@@ -61,10 +61,10 @@ json walked() {
     golden["paths"].push_back({{"from", of(ends[k])},
                                {"to", of(ends.back())},
                                {"length", length_of(find_path(ground, ends[k], ends.back()))}});
-  for (const glm::vec3 place : {glm::vec3(-1, 1, 5), glm::vec3(9, 5, 4), glm::vec3(9, 5, 2)})
-    if (const auto stand = stand_below(ground, place)) {
+  for (const glm::vec3 position : {glm::vec3(-1, 1, 5), glm::vec3(9, 5, 4), glm::vec3(9, 5, 2)})
+    if (const auto stand = stand_below(ground, position)) {
       const glm::vec3 eyes = eyes_of(ground, *stand);
-      golden["below"].push_back({{"place", {place.x, place.y, place.z}},
+      golden["below"].push_back({{"place", {position.x, position.y, position.z}},
                                  {"stand", of(*stand)},
                                  {"eyes", {eyes.x, eyes.y, eyes.z}}});
     }

@@ -13,9 +13,9 @@
 namespace catgs::walk {
 namespace {
 
-Stand stand_at(const WalkMap& map, const glm::vec3& place) {
-  const auto stand = stand_below(map, place);
-  EXPECT_TRUE(stand) << place.x << " " << place.y;
+Stand stand_at(const WalkMap& map, const glm::vec3& position) {
+  const auto stand = stand_below(map, position);
+  EXPECT_TRUE(stand) << position.x << " " << position.y;
   return stand.value_or(Stand{});
 }
 
@@ -33,8 +33,8 @@ TEST(WalkableArea, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
   EXPECT_FALSE(stand_below(map, {0.15f, 2, 1}));
   EXPECT_TRUE(stand_below(map, {0.45f, 2, 1}));
   EXPECT_FALSE(stand_below(map, {1.5f, 4.5f, 1.6f}));  // under the table, and on it
-  const auto has = [&](const glm::vec3& place, Kind kind) {
-    for (const Place& p : map.at(glm::ivec2(map.grid.from_world(place))))
+  const auto has = [&](const glm::vec3& position, Kind kind) {
+    for (const Position& p : map.at(glm::ivec2(map.grid.from_world(position))))
       if (p.kind == kind) return true;
     return false;
   };
@@ -47,7 +47,8 @@ TEST(WalkableArea, KeepsABodysRadiusFromWallsAndKnowsTablesFromWalls) {
 TEST(WalkableArea, TheRoofIsNotReached) {
   const WalkMap map = test::map_of(test::room(0.9f), {2, 2, 1.6f});
   ASSERT_EQ(map.storeys.size(), 1u);
-  for (const Place& place : map.places) EXPECT_NEAR(place.cells(), map.start.height, 1.0f);
+  for (const Position& position : map.positions)
+    EXPECT_NEAR(position.cells(), map.start.height, 1.0f);
 }
 
 TEST(WalkableArea, StairsAreClimbedToAnotherStorey) {
@@ -57,8 +58,8 @@ TEST(WalkableArea, StairsAreClimbedToAnotherStorey) {
   Stand at = below;
   float largest_rise = 0.0f;
   for (const Stand& turn : find_path(map, below, above))
-    for (int k = 0; k < 400 && glm::distance(at.place, turn.place) > 0.01f; ++k) {
-      const glm::vec2 way = turn.place - at.place;
+    for (int k = 0; k < 400 && glm::distance(at.position, turn.position) > 0.01f; ++k) {
+      const glm::vec2 way = turn.position - at.position;
       const Stand next = move(map, at, way * std::min(1.0f, 0.5f / glm::length(way)));
       largest_rise = std::max(largest_rise, std::abs(next.height - at.height));
       at = next;

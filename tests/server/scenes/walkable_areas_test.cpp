@@ -252,8 +252,8 @@ TEST(ComputedWalkableArea, LiesInTheCoordinatesOfAFarFile) {
       glm::dvec3(far.grid.origin) + far.origin - glm::dvec3(near.grid.origin) - there;
   EXPECT_LT(glm::length(moved), 1e-3);
   EXPECT_EQ(far.size, near.size);
-  const auto places = static_cast<double>(near.places.size());
-  EXPECT_NEAR(static_cast<double>(far.places.size()), places, 0.01 * places);
+  const auto places = static_cast<double>(near.positions.size());
+  EXPECT_NEAR(static_cast<double>(far.positions.size()), places, 0.01 * places);
 }
 
 /// The public demo: its ground is found without its file.
@@ -265,7 +265,7 @@ TEST(ComputedWalkableArea, IsFoundInAProceduralScene) {
   source.metres_per_unit = 1.0f;
   std::atomic<int> calls = 0;
   const std::string bytes = compute_walkable_area(source, 2, [&] { ++calls; });
-  EXPECT_GT(map_in(bytes).places.size(), 1000u);
+  EXPECT_GT(map_in(bytes).positions.size(), 1000u);
   struct Stop {};
   for (const int last : {1, calls / 2, calls - 1}) {
     std::atomic<int> left = last;

@@ -92,15 +92,15 @@ export class SceneCoordinates {
 
 export function scene_setup(scene: SceneFacts): SceneSetup {
   const origin = vector_of(scene.origin);
-  const place_of = (v: WireVector | undefined): Vec3 => add(vector_of(v), origin);
+  const position_of = (v: WireVector | undefined): Vec3 => add(vector_of(v), origin);
   const { orientation } = eye_of(scene.startPose, 0);
   return {
     origin,
     up: vector_of(scene.up),
-    start_pose: { position: place_of(scene.startPose?.position), orientation },
-    focus: place_of(scene.focus),
-    limits_min: place_of(scene.limitsMin),
-    limits_max: place_of(scene.limitsMax),
+    start_pose: { position: position_of(scene.startPose?.position), orientation },
+    focus: position_of(scene.focus),
+    limits_min: position_of(scene.limitsMin),
+    limits_max: position_of(scene.limitsMax),
     near_z: scene.nearZ,
     scale: scene.scale,
   };

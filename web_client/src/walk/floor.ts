@@ -3,7 +3,7 @@ import { dot } from '../base/vector';
 import type { Ray } from '../camera/ray';
 import { clear_near } from './map_walker';
 import { height_of, Kind, kind_of } from './tiles';
-import { places_at, to_grid, type Stand, type WalkMap } from './walk_map';
+import { positions_at, to_grid, type Stand, type WalkMap } from './walk_map';
 
 const farthest_cells = 1200;
 const before_wall_cells = 24; // as far as a place before a wall is looked for
@@ -18,10 +18,10 @@ function met_in(
   low: number,
   high: number,
 ): number | 'blocked' | undefined {
-  const places = places_at(map, column, row);
-  for (let i = places.length - 1; i >= 0; --i) {
-    const height = height_of(places[i]!);
-    const kind = kind_of(places[i]!);
+  const positions = positions_at(map, column, row);
+  for (let i = positions.length - 1; i >= 0; --i) {
+    const height = height_of(positions[i]!);
+    const kind = kind_of(positions[i]!);
     if (kind === Kind.clear || kind === Kind.near) {
       if (low <= height && high >= height - map.step) return height;
     } else if (
@@ -84,6 +84,8 @@ function clear_below(
   row: number,
   height: number,
 ): number | undefined {
-  const place = places_at(map, column, row).findLast((at) => height_of(at) <= height);
-  return place !== undefined && kind_of(place) === Kind.clear ? height_of(place) : undefined;
+  const position = positions_at(map, column, row).findLast((at) => height_of(at) <= height);
+  return position !== undefined && kind_of(position) === Kind.clear
+    ? height_of(position)
+    : undefined;
 }

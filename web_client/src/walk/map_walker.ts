@@ -42,10 +42,10 @@ export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | 
     for (let x = -most_cells; x <= most_cells; ++x) {
       const distance = Math.hypot(x, y);
       if (distance >= nearest) continue;
-      const place = clear_at(map, column + x, row + y, stand.height);
-      if (place < 0) continue;
+      const position = clear_at(map, column + x, row + y, stand.height);
+      if (position < 0) continue;
       nearest = distance;
-      const height = height_of(place);
+      const height = height_of(position);
       best =
         distance === 0
           ? { ...stand, height }

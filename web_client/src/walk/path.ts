@@ -12,42 +12,42 @@ const most_skipped = 256; // places that a straight line is tried over
 /** A binary heap of places, the least cost first. */
 class Heap {
   private readonly costs: number[] = [];
-  private readonly places: number[] = [];
+  private readonly positions: number[] = [];
 
   get empty(): boolean {
     return this.costs.length === 0;
   }
 
-  push(cost: number, place: number): void {
-    const { costs, places } = this;
+  push(cost: number, position: number): void {
+    const { costs, positions } = this;
     let i = costs.push(cost) - 1;
-    places.push(place);
+    positions.push(position);
     for (let above = (i - 1) >> 1; i > 0 && costs[above]! > cost; above = (i - 1) >> 1) {
       costs[i] = costs[above]!;
-      places[i] = places[above]!;
+      positions[i] = positions[above]!;
       i = above;
     }
     costs[i] = cost;
-    places[i] = place;
+    positions[i] = position;
   }
 
   pop(): number {
-    const { costs, places } = this;
-    const least = places[0]!;
+    const { costs, positions } = this;
+    const least = positions[0]!;
     const cost = costs.pop()!;
-    const place = places.pop()!;
+    const position = positions.pop()!;
     const n = costs.length;
     let i = 0;
     for (let below = 1; below < n; below = 2 * i + 1) {
       if (below + 1 < n && costs[below + 1]! < costs[below]!) ++below;
       if (costs[below]! >= cost) break;
       costs[i] = costs[below]!;
-      places[i] = places[below]!;
+      positions[i] = positions[below]!;
       i = below;
     }
     if (n > 0) {
       costs[i] = cost;
-      places[i] = place;
+      positions[i] = position;
     }
     return least;
   }
@@ -69,7 +69,7 @@ class Search {
   readonly cost: Float32Array; // the way from the start, cells
   readonly before: Uint32Array; // the node before it on this way
   private readonly column_: Uint32Array;
-  private readonly place_: Uint16Array;
+  private readonly position_: Uint16Array;
   private readonly first_: Int32Array; // node of each tile; -1: the search has not come to it
   private readonly known_: Tile[] = [];
   private nodes_ = 0;
@@ -80,7 +80,7 @@ class Search {
     this.cost = new Float32Array(count);
     this.before = new Uint32Array(count);
     this.column_ = new Uint32Array(count);
-    this.place_ = new Uint16Array(count);
+    this.position_ = new Uint16Array(count);
     this.first_ = new Int32Array(tiles_in(width, depth)).fill(-1);
   }
 
@@ -90,13 +90,13 @@ class Search {
     if (column < 0 || row < 0 || column >= tiles.width || row >= tiles.depth) return -1;
     const t = tile_at(tiles, column, row);
     if (this.first_[t]! < 0) this.come_to(t);
-    const { first, places } = this.known_[t]!;
+    const { first, positions } = this.known_[t]!;
     const c = column_in_tile(tiles, column, row);
-    const i = clear_in(places, first[c]!, first[c + 1]!, height, step);
+    const i = clear_in(positions, first[c]!, first[c + 1]!, height, step);
     if (i < 0) return -1;
     const node = this.first_[t]! + i;
     this.column_[node] = row * tiles.width + column;
-    this.place_[node] = places[i]!;
+    this.position_[node] = positions[i]!;
     return node;
   }
 
@@ -109,14 +109,14 @@ class Search {
   }
 
   height_of(node: number): number {
-    return height_of(this.place_[node]!);
+    return height_of(this.position_[node]!);
   }
 
   private come_to(t: number): void {
     const tile = this.map_.tiles.at(t);
     this.known_[t] = tile;
     this.first_[t] = this.nodes_;
-    this.nodes_ += tile.places.length;
+    this.nodes_ += tile.positions.length;
     require(this.nodes_ <= this.state.length, 'places');
   }
 }

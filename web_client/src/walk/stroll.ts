@@ -8,32 +8,32 @@ import { floor_height } from './walker';
 const usual_cells_per_s = 1.25 * cells_per_eye_height;
 const longest_s = 10; // longer ways are gone faster
 const apart_cells = 0.5; // places of a path
-const smoothed_places = 6; // to each side: stairs become slopes, and corners round
+const smoothed_positions = 6; // to each side: stairs become slopes, and corners round
 const ahead_cells = 1.2 * cells_per_eye_height; // as far as a walker looks along the way
 const speeds_up_s = 0.5;
 const turns_in_s = 1.2;
 
 /** Places along a path, so dense that no stair lies between two. */
 function dense(map: WalkMap, path: readonly Stand[]): Stand[] {
-  const places: Stand[] = path.slice(0, 1);
+  const positions: Stand[] = path.slice(0, 1);
   for (const to of path.slice(1)) {
-    const from = places[places.length - 1]!;
+    const from = positions[positions.length - 1]!;
     const [x, y] = [to.east - from.east, to.north - from.north];
     const pieces = Math.max(1, Math.ceil(Math.hypot(x, y) / apart_cells));
     for (let k = 1; k <= pieces; ++k) {
       const [east, north] = [from.east + (x * k) / pieces, from.north + (y * k) / pieces];
-      const { height } = places[places.length - 1]!;
-      places.push({ east, north, height: floor_height(map, east, north, height) ?? height });
+      const { height } = positions[positions.length - 1]!;
+      positions.push({ east, north, height: floor_height(map, east, north, height) ?? height });
     }
   }
-  return places;
+  return positions;
 }
 
 /** Means over neighbours. The window shrinks towards the ends, which stay. */
-const smoothed = (places: readonly Vec3[]): Vec3[] =>
-  places.map((_, i) => {
-    const side = Math.min(smoothed_places, i, places.length - 1 - i);
-    const near = places.slice(i - side, i + side + 1);
+const smoothed = (positions: readonly Vec3[]): Vec3[] =>
+  positions.map((_, i) => {
+    const side = Math.min(smoothed_positions, i, positions.length - 1 - i);
+    const near = positions.slice(i - side, i + side + 1);
     return scale(near.reduce(add), 1 / near.length);
   });
 
@@ -42,7 +42,7 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
   const up = map.axes[2];
   const eyes = smoothed(smoothed(dense(map, path).map((stand) => eyes_of(map, stand))));
   const along = [0]; // length of the way to each place, world units
-  eyes.slice(1).forEach((place, k) => along.push(along[k]! + length(sub(place, eyes[k]!))));
+  eyes.slice(1).forEach((point, k) => along.push(along[k]! + length(sub(point, eyes[k]!))));
   const way = along[along.length - 1]!;
   const speed = Math.max(usual_cells_per_s * map.cell, way / longest_s);
   const ramp_s = Math.min(speeds_up_s, way / speed);

@@ -15,13 +15,13 @@ const most_tile_bytes = tile_side ** 2 * (1 + 4 * most_in_column);
 export const Kind = { clear: 0, near: 1, low: 2, obstacle: 3 } as const;
 
 /** A place is a height and a kind: height << 2 | kind. */
-export const height_of = (place: number): number => (place >> 2) / per_cell; // cells
-export const kind_of = (place: number): number => place & 3;
+export const height_of = (position: number): number => (position >> 2) / per_cell; // cells
+export const kind_of = (position: number): number => position & 3;
 
 /** The columns of a tile, row by row. */
 export interface Tile {
   readonly first: Uint16Array | Uint32Array; // index of the first place of each column; one more at the end
-  readonly places: Uint16Array; // those of a column ascend
+  readonly positions: Uint16Array; // those of a column ascend
 }
 
 export interface Tiles {
@@ -54,14 +54,14 @@ function read_tile(bytes: Uint8Array, columns: number): Tile {
   const count = bytes.subarray(0, columns).reduce((sum, n) => sum + n, 0);
   require(columns + count <= bytes.length, 'a tile');
   const first = new (count < 2 ** 16 ? Uint16Array : Uint32Array)(columns + 1);
-  const places = new Uint16Array(count);
+  const positions = new Uint16Array(count);
   const last = new Int32Array(most_in_column); // by rank in a column
   let at = columns + count;
-  let place = 0;
+  let position = 0;
   for (let c = 0; c < columns; ++c) {
     const in_column = bytes[c]!;
     require(in_column <= most_in_column, 'a column');
-    for (let k = 0; k < in_column; ++k, ++place) {
+    for (let k = 0; k < in_column; ++k, ++position) {
       let code = 0;
       for (let shift = 0, more = true; more; shift += 7) {
         require(at < bytes.length && shift < 21, 'heights');
@@ -70,19 +70,19 @@ function read_tile(bytes: Uint8Array, columns: number): Tile {
         more = byte >= 128;
       }
       const height = last[k]! + ((code >> 1) ^ -(code & 1));
-      const kind = bytes[columns + place]!;
+      const kind = bytes[columns + position]!;
       require(height >= 0 && height < most_levels * per_cell && kind <= 3, 'a place');
       require(k === 0 || height > last[k - 1]!, 'a place');
-      places[place] = (height << 2) | kind;
+      positions[position] = (height << 2) | kind;
       last[k] = height;
     }
-    first[c + 1] = place;
+    first[c + 1] = position;
   }
   require(at === bytes.length, 'a tile');
-  return { first, places };
+  return { first, positions };
 }
 
-const nothing: Tile = { first: new Uint16Array(tile_side ** 2 + 1), places: new Uint16Array(0) };
+const nothing: Tile = { first: new Uint16Array(tile_side ** 2 + 1), positions: new Uint16Array(0) };
 
 /** The tiles of a file: its index and what is behind it. Keeps the last ones that were asked for. */
 export class PackedTiles implements Tiles {
@@ -127,7 +127,7 @@ export class PackedTiles implements Tiles {
     let count = 0;
     for (let t = 0; t < this.unpacked_.length; ++t) {
       await breaths.take();
-      count += this.unpack(t).places.length;
+      count += this.unpack(t).positions.length;
     }
     require(count === this.count, 'places');
   }

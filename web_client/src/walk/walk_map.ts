@@ -17,7 +17,7 @@ import {
 const plain_header_bytes = 320;
 const origin_bytes = 24; // of the scene: three doubles behind the header of version 3
 const most_side = 2048;
-const most_places = 2 ** 24;
+const most_positions = 2 ** 24;
 const most_storeys = 16;
 const most_person_cells = 160;
 const most_bytes = 2 ** 27; // of a file
@@ -82,13 +82,13 @@ const holds = ({ width, depth }: Tiles, column: number, row: number): boolean =>
   column >= 0 && row >= 0 && column < width && row < depth;
 
 /** The places of a column ascend. Outside of the map there are none. */
-export function places_at({ tiles }: WalkMap, column: number, row: number): Uint16Array {
-  if (!holds(tiles, column, row)) return no_places;
-  const { first, places } = tiles.at(tile_at(tiles, column, row));
+export function positions_at({ tiles }: WalkMap, column: number, row: number): Uint16Array {
+  if (!holds(tiles, column, row)) return no_positions;
+  const { first, positions } = tiles.at(tile_at(tiles, column, row));
   const c = column_in_tile(tiles, column, row);
-  return places.subarray(first[c], first[c + 1]);
+  return positions.subarray(first[c], first[c + 1]);
 }
-const no_places = new Uint16Array(0);
+const no_positions = new Uint16Array(0);
 
 /** The clear ground of a column within a step of `height`; -1 where there is none. */
 export function clear_at(
@@ -98,22 +98,25 @@ export function clear_at(
   height: number,
 ): number {
   if (!holds(tiles, column, row)) return -1;
-  const { first, places } = tiles.at(tile_at(tiles, column, row));
+  const { first, positions } = tiles.at(tile_at(tiles, column, row));
   const c = column_in_tile(tiles, column, row);
-  const i = clear_in(places, first[c]!, first[c + 1]!, height, step);
-  return i < 0 ? -1 : places[i]!;
+  const i = clear_in(positions, first[c]!, first[c + 1]!, height, step);
+  return i < 0 ? -1 : positions[i]!;
 }
 
 /** The index of the clear ground within a step of `height` among the places of a column; -1 where there is none. */
 export function clear_in(
-  places: Uint16Array,
+  positions: Uint16Array,
   begin: number,
   end: number,
   height: number,
   step: number,
 ): number {
   for (let i = begin; i < end; ++i)
-    if (kind_of(places[i]!) === Kind.clear && Math.abs(height_of(places[i]!) - height) <= step)
+    if (
+      kind_of(positions[i]!) === Kind.clear &&
+      Math.abs(height_of(positions[i]!) - height) <= step
+    )
       return i;
   return -1;
 }
@@ -143,7 +146,7 @@ export function* blocks({ tiles }: WalkMap): Generator<Block> {
 /** The smallest block around the columns with such places; undefined: there are none. */
 export async function block_around(
   map: WalkMap,
-  such: (place: number) => boolean,
+  such: (position: number) => boolean,
 ): Promise<Block | undefined> {
   let [west, south, east, north] = [Infinity, Infinity, 0, 0];
   const breaths = new Breaths();
@@ -153,7 +156,7 @@ export async function block_around(
       continue;
     for (let row = block.south; row < block.north; ++row)
       for (let column = block.west; column < block.east; ++column) {
-        if (!places_at(map, column, row).some(such)) continue;
+        if (!positions_at(map, column, row).some(such)) continue;
         [west, south] = [Math.min(west, column), Math.min(south, row)];
         [east, north] = [Math.max(east, column + 1), Math.max(north, row + 1)];
       }
@@ -193,7 +196,7 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
   require(crc32(new Uint8Array(file, 16)) === word(12), 'checksum');
   const [width, depth] = [word(104), word(108)];
   require(width >= 1 && width <= most_side && depth >= 1 && depth <= most_side, 'size');
-  require(word(112) <= most_places, 'places');
+  require(word(112) <= most_positions, 'places');
   require(word(116) === tile_side, 'tile side');
   require(word(120) === file.byteLength - header_bytes, 'packed bytes');
   const tiles = new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes));

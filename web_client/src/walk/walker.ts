@@ -1,7 +1,7 @@
 // A body that walks on a WalkMap: the same steps as render_core/walk/walker.h, which is its oracle.
 import type { Vec3 } from '../base/vector';
 import { height_of, Kind, kind_of } from './tiles';
-import { clear_at, places_at, to_grid, type Stand, type WalkMap } from './walk_map';
+import { clear_at, positions_at, to_grid, type Stand, type WalkMap } from './walk_map';
 
 const piece = 0.4; // cells; a body moves by at most this much at a time
 const most_pieces = 25_000;
@@ -49,7 +49,7 @@ function try_piece(map: WalkMap, from: Stand, x: number, y: number): Stand | und
 /** The clear ground below a point of the world, where a visitor would come to stand. */
 export function stand_below(map: WalkMap, point: Vec3): Stand | undefined {
   const [east, north, height] = to_grid(map, point);
-  const below = places_at(map, Math.floor(east), Math.floor(north)).findLast(
+  const below = positions_at(map, Math.floor(east), Math.floor(north)).findLast(
     (at) => kind_of(at) === Kind.clear && height_of(at) <= height + map.step,
   );
   return below === undefined ? undefined : { east, north, height: height_of(below) };

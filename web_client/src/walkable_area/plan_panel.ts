@@ -10,7 +10,7 @@ import { clear_near } from '../walk/map_walker';
 import { height_of } from '../walk/tiles';
 import {
   cells_per_eye_height,
-  places_at,
+  positions_at,
   storey_at,
   to_grid,
   type Stand,
@@ -203,8 +203,10 @@ export class PlanPanel {
   private clicked(x: number, y: number): void {
     if (!this.drawn_) return;
     const [east, north] = cells_of(this.drawn_, x, y);
-    for (const place of [...places_at(this.map_, Math.floor(east), Math.floor(north))].reverse()) {
-      const height = height_of(place);
+    for (const point of [
+      ...positions_at(this.map_, Math.floor(east), Math.floor(north)),
+    ].reverse()) {
+      const height = height_of(point);
       if (storey_at(this.map_, height) !== this.storey_) continue;
       const stand = clear_near(this.map_, { east, north, height });
       if (stand) return this.parts_.go_to(stand);

@@ -5,7 +5,7 @@ import {
   block_around,
   blocks,
   clear_at,
-  places_at,
+  positions_at,
   storey_at,
   type WalkMap,
 } from '../walk/walk_map';
@@ -32,7 +32,7 @@ export interface PlanPicture {
 
 /** Higher places cover lower ones. Of the cells of a pixel the darkest counts, so that no wall is lost. */
 export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPicture> {
-  const in_storey = (place: number): boolean => storey_at(map, height_of(place)) === storey;
+  const in_storey = (position: number): boolean => storey_at(map, height_of(position)) === storey;
   const { west, south, east, north } = (await block_around(map, in_storey)) ?? {
     west: 0,
     south: 0,
@@ -47,7 +47,7 @@ export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPi
     await breaths.take();
     for (let row = block.south; row < block.north; ++row)
       for (let column = block.west; column < block.east; ++column) {
-        const top = places_at(map, column, row).findLast(in_storey);
+        const top = positions_at(map, column, row).findLast(in_storey);
         if (top === undefined) continue;
         const [r, g, b] =
           colours[kind_of(top)] ?? (cells === 1 ? lit(map, column, row, height_of(top)) : level);

@@ -55,8 +55,8 @@ TEST_F(SortStage, OrdersSplatsByDepthAsAStableSort) {
   Numbers expected = counting(count);
   std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return keys[i]; });
   const Numbers drawn = fetch(order.current, count);
-  Mismatches places("sort: places in depth order", 0.0);
-  for (std::uint32_t k = 0; k < count; ++k) places.add(drawn[k] != expected[k]);
+  Mismatches positions("sort: places in depth order", 0.0);
+  for (std::uint32_t k = 0; k < count; ++k) positions.add(drawn[k] != expected[k]);
 }
 
 TEST_F(SortStage, SumsTileCountsInDepthOrder) {
@@ -95,9 +95,9 @@ void expect_lists(const Numbers& numbers, std::uint32_t tiles, const std::vector
   Numbers expected = counting(numbers.size());
   std::erase_if(expected, [&](std::uint32_t i) { return numbers[i] >= tiles; });
   std::ranges::stable_sort(expected, {}, [&](std::uint32_t i) { return numbers[i]; });
-  Mismatches places("sort: places in order of tiles", 0.0);
+  Mismatches positions("sort: places in order of tiles", 0.0);
   for (std::size_t k = 0; k < expected.size(); ++k)
-    places.add(drawn[k].slot != expected[k] || drawn[k].blocks != ~expected[k]);
+    positions.add(drawn[k].slot != expected[k] || drawn[k].blocks != ~expected[k]);
 
   Mismatches found("ranges: of tiles", 0.0);
   for (std::uint32_t t = 0; t < tiles; ++t) {

@@ -20,7 +20,7 @@ class OcclusionStage : public StageTest {
   static constexpr int parts_x = (size_px.x + part_side_px - 1) / part_side_px;
   static constexpr int parts_y = (size_px.y + part_side_px - 1) / part_side_px;
 
-  [[nodiscard]] std::size_t place(int x, int y) const {
+  [[nodiscard]] std::size_t point(int x, int y) const {
     return static_cast<std::size_t>((y / parts_across * shape_.tiles_x + x / parts_across) *
                                         parts_per_tile +
                                     y % parts_across * parts_across + x % parts_across);
@@ -60,8 +60,8 @@ class OcclusionStage : public StageTest {
 TEST_F(OcclusionStage, AStillCameraKeepsTheDeepestEndAround) {
   std::vector<float> ends = even(4.0f);
   std::vector<float2> of_tiles;
-  ends[place(7, 5)] = 9.0f;
-  ends[place(20, 12)] = unknown;
+  ends[point(7, 5)] = 9.0f;
+  ends[point(20, 12)] = unknown;
   const std::vector<float> found = limits(ends, Pose{}, Pose{}, 1, of_tiles);
   Difference limit("occlusion: limits of a still camera, world units", 1e-4);
   for (int y = 0; y < parts_y; ++y) {
@@ -69,7 +69,7 @@ TEST_F(OcclusionStage, AStillCameraKeepsTheDeepestEndAround) {
       const auto near = [&](int at_x, int at_y) {
         return std::abs(x - at_x) <= 1 && std::abs(y - at_y) <= 1;
       };
-      const float at = found[place(x, y)];
+      const float at = found[point(x, y)];
       if (near(20, 12)) {
         EXPECT_EQ(at, unknown);
       } else {
@@ -96,7 +96,7 @@ TEST_F(OcclusionStage, LimitsAreNeverBeforeTheSurfaceTheyComeFrom) {
     std::size_t known = 0;
     for (int y = 0; y < parts_y; ++y) {
       for (int x = 0; x < parts_x; ++x) {
-        const float limit = found[place(x, y)];
+        const float limit = found[point(x, y)];
         if (std::isinf(limit)) continue;
         ++known;
         const glm::dvec3 ray(((x + 0.5) * part_side_px - 0.5 * size_px.x) / 150.0,
@@ -118,13 +118,13 @@ TEST_F(OcclusionStage, PartsOutsideTheLastPictureAreNotLimited) {
   std::vector<float2> of_tiles;
   const std::vector<float> found = limits(even(5.0f), now, last, 1, of_tiles);
   for (int y = 0; y < parts_y; ++y) {
-    EXPECT_EQ(found[place(parts_x - 1, y)], unknown);  // at the side that the camera turns to
-    EXPECT_LT(found[place(2, y)], unknown);
+    EXPECT_EQ(found[point(parts_x - 1, y)], unknown);  // at the side that the camera turns to
+    EXPECT_LT(found[point(2, y)], unknown);
   }
   const Pose behind = catgs::test::moved(last, {"about", {0, 0, 0}, {0, 3.14f, 0}});
   for (int y = 0; y < parts_y; ++y)
     for (int x = 0; x < parts_x; ++x)
-      EXPECT_EQ(limits(even(5.0f), behind, last, 1, of_tiles)[place(x, y)], unknown);
+      EXPECT_EQ(limits(even(5.0f), behind, last, 1, of_tiles)[point(x, y)], unknown);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST_P(ProjectStage, SplatsAreThoseOfTheCpuCore) {
   // What packing rounds: shapes to 2^-15 of the largest entry of their factor, which a needle's
   // width feels thirty times, harmonics to 8 bits, colours to halves, opacities beside harmonics to
   // 12 bits.
-  Difference place("project: centre, share of 1 px and its hundredth part off the middle", 1e-3);
+  Difference position("project: centre, share of 1 px and its hundredth part off the middle", 1e-3);
   Difference shape("project: whitening, share of its entries' sum", 5e-3);
   Difference opacity("project: log2 of opacity", 2e-3), colour("project: colour", 0.02);
   Difference path("project: path, share of 1 px and its length", 5e-3);
@@ -51,8 +51,8 @@ TEST_P(ProjectStage, SplatsAreThoseOfTheCpuCore) {
     if (e.log2_opacity == hidden_log2_opacity) continue;
     const SplatRecord& r = records[v];
     const double far = 1.0 + 0.01 * (std::abs(e.centre_x) + std::abs(e.centre_y));
-    place.add((r.centre_px.x - e.centre_x) / far);
-    place.add((r.centre_px.y - e.centre_y) / far);
+    position.add((r.centre_px.x - e.centre_x) / far);
+    position.add((r.centre_px.y - e.centre_y) / far);
     const double sum =
         std::abs(e.whitening_xx) + std::abs(e.whitening_xy) + std::abs(e.whitening_yy);
     shape.add((r.whitening.xx - e.whitening_xx) / sum);

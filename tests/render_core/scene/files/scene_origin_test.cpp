@@ -39,19 +39,19 @@ GaussianCloud small_splats(std::size_t count = 200) {
   return cloud;
 }
 
-using Places = std::vector<glm::dvec3>;
+using Positions = std::vector<glm::dvec3>;
 
-Places moved(const GaussianCloud& cloud, const glm::dvec3& by) {
-  Places places;
-  for (const glm::vec3& mean : cloud.mean) places.push_back(glm::dvec3(mean) + by);
-  return places;
+Positions moved(const GaussianCloud& cloud, const glm::dvec3& by) {
+  Positions positions;
+  for (const glm::vec3& mean : cloud.mean) positions.push_back(glm::dvec3(mean) + by);
+  return positions;
 }
 
-Places in_file(const GaussianCloud& cloud, const glm::dvec3& origin) {
+Positions in_file(const GaussianCloud& cloud, const glm::dvec3& origin) {
   return moved(cloud, origin);
 }
 
-void expect_near(const Places& read, const Places& told, double tolerance = 1e-4) {
+void expect_near(const Positions& read, const Positions& told, double tolerance = 1e-4) {
   ASSERT_EQ(read.size(), told.size());
   double worst = 0.0;
   for (std::size_t i = 0; i < read.size(); ++i)
@@ -60,10 +60,10 @@ void expect_near(const Places& read, const Places& told, double tolerance = 1e-4
 }
 
 /// A .ply whose places are doubles.
-std::string double_ply(const GaussianCloud& cloud, const Places& places,
+std::string double_ply(const GaussianCloud& cloud, const Positions& positions,
                        const std::string& encoding) {
   std::string out =
-      "ply\nformat " + encoding + " 1.0\nelement vertex " + std::to_string(places.size()) + "\n";
+      "ply\nformat " + encoding + " 1.0\nelement vertex " + std::to_string(positions.size()) + "\n";
   for (const char* name : {"x", "y", "z"}) out += std::string("property double ") + name + "\n";
   for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
                            "rot_0", "rot_1", "rot_2", "rot_3"})
@@ -75,8 +75,8 @@ std::string double_ply(const GaussianCloud& cloud, const Places& places,
     if (encoding == "binary_big_endian") std::ranges::reverse(bytes);
     out += encoding == "ascii" ? fmt::format("{} ", value) : bytes;
   };
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (int k = 0; k < 3; ++k) put(places[i][k]);
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    for (int k = 0; k < 3; ++k) put(positions[i][k]);
     for (int k = 0; k < 3; ++k) put(cloud.sh_of(i)[0][k]);
     put(logit(cloud.opacity[i]));
     for (int k = 0; k < 3; ++k) put(std::log(cloud.scale[i][k]));
@@ -88,7 +88,7 @@ std::string double_ply(const GaussianCloud& cloud, const Places& places,
 }
 
 /// SOG whose texels stand for places 8 units around the survey's, and these places.
-std::map<std::string, std::string> far_sog(const GaussianCloud& cloud, Places& told) {
+std::map<std::string, std::string> far_sog(const GaussianCloud& cloud, Positions& told) {
   std::map<std::string, std::string> files = encode_sog(cloud, 2);
   Json meta = Json::parse(files.at("meta.json"));
   Json& means = meta["means"];
@@ -113,7 +113,7 @@ std::map<std::string, std::string> far_sog(const GaussianCloud& cloud, Places& t
 
 /// Compressed .ply: the limits of its one chunk are moved. They are floats, what lies between is
 /// not.
-std::string far_compressed_ply(const GaussianCloud& cloud, Places& told) {
+std::string far_compressed_ply(const GaussianCloud& cloud, Positions& told) {
   std::string bytes = encode_compressed_ply(cloud, false);
   const MemorySource file("near.ply", bytes_of(bytes));
   const GaussianCloud near = read_compressed_ply(file, read_ply_header(file), two_threads());
@@ -139,7 +139,7 @@ std::string far_compressed_ply(const GaussianCloud& cloud, Places& told) {
 }
 
 /// .ksplat: the centres of its buckets are moved. They are floats, the steps around them are finer.
-std::string far_ksplat(const GaussianCloud& cloud, Places& told) {
+std::string far_ksplat(const GaussianCloud& cloud, Positions& told) {
   std::string bytes = encode_ksplat(cloud, {.level = 1, .sections = 1});
   const GaussianCloud near = read_ksplat(MemorySource("near", bytes_of(bytes)), two_threads());
   told = moved(near, {});
@@ -166,7 +166,7 @@ std::string far_ksplat(const GaussianCloud& cloud, Places& told) {
 }
 
 /// glTF at the end of a chain of nodes: turned by an odd angle, then moved.
-std::string far_gltf(const GaussianCloud& cloud, Places& told) {
+std::string far_gltf(const GaussianCloud& cloud, Positions& told) {
   GltfParts parts = encode_gltf(cloud);
   const glm::dquat turn = glm::angleAxis(0.7, glm::normalize(glm::dvec3(1.0, 2.0, -0.5)));
   const glm::dvec3 arm(4321.5, -1234.25, 98765.125), base(-survey.x, -survey.y, survey.z);
@@ -185,7 +185,7 @@ std::string far_gltf(const GaussianCloud& cloud, Places& told) {
 
 class SceneOriginTest : public FolderTest {
  protected:
-  void expect_told(const Scene& scene, const Places& told) const {
+  void expect_told(const Scene& scene, const Positions& told) const {
     EXPECT_NE(scene.hints.origin, glm::dvec3(0.0));
     EXPECT_EQ(scene.hints.origin, glm::round(scene.hints.origin)) << "whole units";
     expect_near(in_file(scene.cloud, scene.hints.origin), told);
@@ -196,16 +196,17 @@ class SceneOriginTest : public FolderTest {
 
 TEST_F(SceneOriginTest, FarPlacesAreAsTheFileSays) {
   const GaussianCloud cloud = small_splats();
-  const Places places = moved(cloud, survey);
-  Places told;
+  const Positions positions = moved(cloud, survey);
+  Positions told;
   struct Case {
     std::string name;
     std::string bytes;
-    Places told;
+    Positions told;
   };
   std::vector<Case> cases;
   for (const char* encoding : {"binary_little_endian", "binary_big_endian", "ascii"})
-    cases.push_back({std::string(encoding) + ".ply", double_ply(cloud, places, encoding), places});
+    cases.push_back(
+        {std::string(encoding) + ".ply", double_ply(cloud, positions, encoding), positions});
   cases.push_back({"a.sog", zip(far_sog(cloud, told)), {}});
   cases.back().told = told;
   cases.push_back({"b.compressed.ply", far_compressed_ply(cloud, told), {}});
@@ -234,8 +235,8 @@ TEST_F(SceneOriginTest, FarFloatsStayAsTheyAre) {
 
 TEST_F(SceneOriginTest, PartsShareOneOrigin) {
   const GaussianCloud cloud = small_splats(1000);
-  const Places places = moved(cloud, survey);
-  Places fine, coarse;
+  const Positions positions = moved(cloud, survey);
+  Positions fine, coarse;
   for (const auto& [file, bytes] : far_sog(cloud, fine)) write("sog/0/" + file, bytes);
   for (const auto& [file, bytes] : far_sog(small_splats(100), coarse))
     write("sog/1/" + file, bytes);
@@ -248,15 +249,15 @@ TEST_F(SceneOriginTest, PartsShareOneOrigin) {
                                   {"tree", {{"lods", lods}}}}
                                  .dump());
   const auto pool = std::make_shared<ThreadPool>(2);
-  const std::vector<std::pair<std::filesystem::path, Places>> cases = {
-      {write("a.ply", double_ply(cloud, places, "binary_little_endian")), places},
-      {write("b.ply", double_ply(cloud, places, "binary_big_endian")), places},
+  const std::vector<std::pair<std::filesystem::path, Positions>> cases = {
+      {write("a.ply", double_ply(cloud, positions, "binary_little_endian")), positions},
+      {write("b.ply", double_ply(cloud, positions, "binary_big_endian")), positions},
       {folder_ / "sog", fine}};
   for (const auto& [path, told] : cases) {
     SCOPED_TRACE(path.string());
     const auto scene = scene_in_parts(locate_scene(path), {}, pool, 77);
     ASSERT_TRUE(scene);
-    Places read;
+    Positions read;
     scene->parts.each([&](const GaussianCloud& part) {
       std::ranges::copy(in_file(part, scene->parts.origin), std::back_inserter(read));
     });
@@ -304,7 +305,7 @@ TEST_F(SceneOriginTest, LevelsShareTheOriginOfTheirTiles) {
   root["transform"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, at.x, at.y, at.z, 1};
   write("tileset.json",
         Json{{"asset", {{"version", "1.1"}}}, {"geometricError", 9}, {"root", root}}.dump());
-  Places told;
+  Positions told;
   for (const glm::vec3& mean : cloud.mean) {
     const glm::dvec3 gltf(-mean.x, -mean.y, mean.z);  // y up
     const glm::dvec3 z_up = glm::dvec3(gltf.x, -gltf.z, gltf.y) + at;
@@ -316,15 +317,15 @@ TEST_F(SceneOriginTest, LevelsShareTheOriginOfTheirTiles) {
 TEST_F(SceneOriginTest, HintFilesCountFromTheFilesZero) {
   const GaussianCloud cloud = small_splats();
   write("a.ply", double_ply(cloud, moved(cloud, survey), "binary_little_endian"));
-  const auto place = [](const glm::dvec3& by) -> Json {
+  const auto point = [](const glm::dvec3& by) -> Json {
     return {survey.x + by.x, survey.y + by.y, survey.z + by.z};
   };
   const auto at = [](const SceneHints& hints, const glm::vec3& p) {
     return glm::dvec3(p) + hints.origin - survey;
   };
-  write("a.json", Json{{"start_pose", {{"position", place({1, 2, -20})}, {"look_at", place({})}}},
-                       {"limits", {{"min", place({-30, -30, -30})}, {"max", place({30, 30, 30})}}},
-                       {"focus", place({0.25, 0, 0})}}
+  write("a.json", Json{{"start_pose", {{"position", point({1, 2, -20})}, {"look_at", point({})}}},
+                       {"limits", {{"min", point({-30, -30, -30})}, {"max", point({30, 30, 30})}}},
+                       {"focus", point({0.25, 0, 0})}}
                       .dump());
   const Scene scene = load_scene(folder_ / "a.ply");
   const SceneHints& hints = scene.hints;
@@ -334,14 +335,14 @@ TEST_F(SceneOriginTest, HintFilesCountFromTheFilesZero) {
   write_sidecar(hints, folder_ / "again.json");
   const Json again = Json::parse(content_of(folder_ / "again.json"));
   for (std::size_t k = 0; k < 3; ++k)
-    EXPECT_NEAR(again["limits"]["min"][k].get<double>(), place({-30, -30, -30})[k].get<double>(),
+    EXPECT_NEAR(again["limits"]["min"][k].get<double>(), point({-30, -30, -30})[k].get<double>(),
                 1e-4);
 
   // The cameras of a training: a 3x3 rotation, or a 4x4 matrix.
   const glm::dvec3 eye(3.1, 0.2, -15.7);
   const glm::dvec3 there = survey + eye;
   const Json rows = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  write("cameras.json", Json::array({{{"position", place(eye)}, {"rotation", rows}}}).dump());
+  write("cameras.json", Json::array({{{"position", point(eye)}, {"rotation", rows}}}).dump());
   write(
       "transforms.json",
       Json{
@@ -362,8 +363,9 @@ TEST_F(SceneOriginTest, HintFilesCountFromTheFilesZero) {
 }
 
 TEST(SceneOrigin, TheBulkOfAScenePutsIt) {
-  const auto cluster = [](std::vector<glm::vec3>& places, std::size_t count, const glm::vec3& at) {
-    for (const glm::vec3& mean : small_splats(count).mean) places.push_back(at + mean);
+  const auto cluster = [](std::vector<glm::vec3>& positions, std::size_t count,
+                          const glm::vec3& at) {
+    for (const glm::vec3& mean : small_splats(count).mean) positions.push_back(at + mean);
   };
   struct Case {
     std::string name;
@@ -381,9 +383,9 @@ TEST(SceneOrigin, TheBulkOfAScenePutsIt) {
       {"nothing usable", {{3, glm::vec3(NAN)}, {3, glm::vec3(1e12f)}}, {0, 0, 0}},
       {"nothing", {}, {0, 0, 0}}};
   for (const Case& of : cases) {
-    std::vector<glm::vec3> places;
-    for (const auto& [count, at] : of.clusters) cluster(places, count, at);
-    const glm::dvec3 origin = find_origin(places);
+    std::vector<glm::vec3> positions;
+    for (const auto& [count, at] : of.clusters) cluster(positions, count, at);
+    const glm::dvec3 origin = find_origin(positions);
     if (of.origin == glm::dvec3(0.0))
       EXPECT_EQ(origin, glm::dvec3(0.0)) << of.name;
     else
@@ -405,11 +407,11 @@ TEST_F(SceneOriginTest, PlacesFarFromTheOriginKeepAFloatsDigits) {
                return survey + glm::dvec3(30.0 * static_cast<double>(i), 0.0, 0.0);
              }}}) {
     SCOPED_TRACE(of.name);
-    Places told;
+    Positions told;
     for (std::size_t i = 0; i < cloud.size(); ++i)
       told.push_back(glm::dvec3(cloud.mean[i]) + of.by(i));
     const Scene scene = load_scene(write(of.name, double_ply(cloud, told, "binary_little_endian")));
-    const Places read = in_file(scene.cloud, scene.hints.origin);
+    const Positions read = in_file(scene.cloud, scene.hints.origin);
     ASSERT_EQ(read.size(), told.size());
     std::size_t close = 0;
     for (std::size_t i = 0; i < told.size(); ++i) {
@@ -424,13 +426,14 @@ TEST_F(SceneOriginTest, PlacesFarFromTheOriginKeepAFloatsDigits) {
 
 TEST_F(SceneOriginTest, WrittenCopiesHaveTheSameCoordinates) {
   const GaussianCloud cloud = small_splats();
-  const Places places = moved(cloud, survey);
-  const Scene scene = load_scene(write("a.ply", double_ply(cloud, places, "binary_little_endian")));
+  const Positions positions = moved(cloud, survey);
+  const Scene scene =
+      load_scene(write("a.ply", double_ply(cloud, positions, "binary_little_endian")));
   for (const char* name : {"b.ply", "b.glb"}) {
     ASSERT_TRUE(keeps_origin(name));
     save_scene(scene.cloud, folder_ / name, 2, scene.hints.origin);
     SCOPED_TRACE(name);
-    expect_told(load_scene(folder_ / name), places);
+    expect_told(load_scene(folder_ / name), positions);
   }
   for (const char* name : {"b.sog", "b.spz", "b.splat"}) {
     EXPECT_FALSE(keeps_origin(name)) << name;

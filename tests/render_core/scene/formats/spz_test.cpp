@@ -97,9 +97,10 @@ TEST(Spz, SmallScenesKeepTheirPositions) {
   }
   std::ostringstream out;
   write_spz(cloud, out);
-  std::set<std::array<float, 3>> places;
-  for (const glm::vec3& mean : parse(out.str()).cloud.mean) places.insert({mean.x, mean.y, mean.z});
-  EXPECT_GT(places.size(), 390u);
+  std::set<std::array<float, 3>> positions;
+  for (const glm::vec3& mean : parse(out.str()).cloud.mean)
+    positions.insert({mean.x, mean.y, mean.z});
+  EXPECT_GT(positions.size(), 390u);
 }
 
 TEST(Spz, LossesAreTold) {
@@ -205,12 +206,12 @@ TEST(Spz, TheOrbitExtensionIsRead) {
 }
 
 /// Right, down, front of a place whose axes are named by letters: "LUB" is left, up, back.
-glm::dvec3 by_letters(const glm::dvec3& place, std::string_view axes) {
+glm::dvec3 by_letters(const glm::dvec3& position, std::string_view axes) {
   glm::dvec3 turned(0.0);
   for (int k = 0; k < 3; ++k)
     for (const std::string_view pair : {"RL", "DU", "FB"})
       if (const auto at = pair.find(axes[static_cast<std::size_t>(k)]); at != pair.npos)
-        turned[pair == "RL" ? 0 : pair == "DU" ? 1 : 2] = at == 0 ? place[k] : -place[k];
+        turned[pair == "RL" ? 0 : pair == "DU" ? 1 : 2] = at == 0 ? position[k] : -position[k];
   return turned;
 }
 
@@ -223,12 +224,12 @@ float green(const GaussianCloud& cloud, std::size_t i, const glm::dvec3& directi
 
 /// As the reference library turns: it flips the axes whose bits differ from those of right, down,
 /// front, and then turns the systems from 9 on by a quarter about x.
-glm::dvec3 by_library(glm::dvec3 place, std::uint32_t system) {
+glm::dvec3 by_library(glm::dvec3 position, std::uint32_t system) {
   constexpr std::uint32_t right_down_front = 6;
   const std::uint32_t differ = (system - 1) ^ (right_down_front - 1);
   for (int k = 0; k < 3; ++k)
-    if (differ >> k & 1) place[k] = -place[k];
-  return system < 9 ? place : glm::dvec3(place.x, place.z, -place.y);
+    if (differ >> k & 1) position[k] = -position[k];
+  return system < 9 ? position : glm::dvec3(position.x, position.z, -position.y);
 }
 
 constexpr std::array<std::string_view, 16> systems = {"LDB", "RDB", "LUB", "RUB", "LDF", "RDF",
@@ -236,12 +237,12 @@ constexpr std::array<std::string_view, 16> systems = {"LDB", "RDB", "LUB", "RUB"
                                                       "LBD", "RBD", "LBU", "RBU"};
 
 TEST(Spz, FourSystemsLieHalfATurnFromTheirLetters) {
-  const glm::dvec3 place(1, 2, 3);
+  const glm::dvec3 position(1, 2, 3);
   for (std::uint32_t s = 1; s <= 16; ++s) {
     const glm::dvec3 half_a_turn(1, -1, -1);
     const bool differs = s == 9 || s == 10 || s >= 15;
-    EXPECT_EQ(by_library(place, s),
-              by_letters(place, systems[s - 1]) * (differs ? half_a_turn : glm::dvec3(1)))
+    EXPECT_EQ(by_library(position, s),
+              by_letters(position, systems[s - 1]) * (differs ? half_a_turn : glm::dvec3(1)))
         << s;
   }
 }
@@ -254,8 +255,8 @@ TEST(Spz, AllSixteenSystemsAreTurned) {
     SCOPED_TRACE(systems[s]);
     const SpzStyle style{.coordinate_system = static_cast<std::uint32_t>(s + 1)};
     const GaussianCloud read = parse(encode_spz(cloud, style)).cloud;
-    const auto turned = [s](const glm::dvec3& place) {
-      return by_library(place, static_cast<std::uint32_t>(s + 1));
+    const auto turned = [s](const glm::dvec3& position) {
+      return by_library(position, static_cast<std::uint32_t>(s + 1));
     };
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       EXPECT_LT(glm::distance(glm::dvec3(read.mean[i]), turned(glm::dvec3(plain.mean[i]))), 1e-6);

@@ -28,9 +28,9 @@ Json tile(const std::string& content, const std::string& refine = "REPLACE",
 }
 
 /// A Gaussian at this place of the glTF.
-std::string gltf_at(const glm::vec3& place) {
+std::string gltf_at(const glm::vec3& position) {
   GaussianCloud cloud = random_cloud(1, 0);
-  cloud.mean[0] = {-place.x, -place.y, place.z};
+  cloud.mean[0] = {-position.x, -position.y, position.z};
   return encode_gltf(cloud).glb();
 }
 

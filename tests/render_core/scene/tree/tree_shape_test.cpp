@@ -14,7 +14,7 @@ TEST(TreeShape, EveryNodeHasASlotOfItsOwnBesideItsFamily) {
       SCOPED_TRACE(testing::Message() << leaves << " leaves, degree " << degree);
       const TreeShape shape(leaves * cluster_size - 7, degree);
       ASSERT_EQ(shape.leaves(), leaves);
-      std::set<std::pair<std::uint64_t, std::size_t>> places;
+      std::set<std::pair<std::uint64_t, std::size_t>> positions;
       for (int level = 0; level < shape.levels(); ++level)
         for (std::uint32_t i = 0; i < shape.nodes_on(level); ++i) {
           const NodeId node{static_cast<std::uint8_t>(level), i};
@@ -22,7 +22,7 @@ TEST(TreeShape, EveryNodeHasASlotOfItsOwnBesideItsFamily) {
           const std::size_t slot = shape.slot_of(node);
           ASSERT_LT(page, shape.pages());
           ASSERT_LT(slot, shape.slots());
-          ASSERT_TRUE(places.emplace(page, slot).second);
+          ASSERT_TRUE(positions.emplace(page, slot).second);
           if (slot == 0) {
             ASSERT_EQ(shape.root_of(page), node);
           }

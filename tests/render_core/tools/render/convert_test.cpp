@@ -124,8 +124,9 @@ TEST_F(Convert, FarScenesKeepTheirCoordinates) {
                           "portal": {"scene": "b", "position": [7, 7, 7]}}]}]})";
   ASSERT_EQ(convert("far.ply", "--translate=" + by).exit_code, 0);
   const GaussianCloud before = load_scene(scene()).cloud;
-  const auto far_from = [](const json& place, const glm::dvec3& wanted) {
-    const glm::dvec3 at(place[0].get<double>(), place[1].get<double>(), place[2].get<double>());
+  const auto far_from = [](const json& position, const glm::dvec3& wanted) {
+    const glm::dvec3 at(position[0].get<double>(), position[1].get<double>(),
+                        position[2].get<double>());
     return glm::distance(at, wanted);
   };
   constexpr glm::dvec3 start(0, 0, -4), aside(1, 0, 0);

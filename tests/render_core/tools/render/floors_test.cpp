@@ -42,7 +42,7 @@ TEST_F(Floors, WritesAMapAndAPlan) {
   EXPECT_THAT(found.out, AllOf(HasSubstr("eye height 1.6, cells of 0.1"), HasSubstr("storey 0")));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "plan.png"));
   const walk::WalkMap map = walk::read_walk_file(FileSource(folder_ / "room.walk"));
-  EXPECT_GT(map.places.size(), 2000u);
+  EXPECT_GT(map.positions.size(), 2000u);
 }
 
 TEST_F(Floors, TheRoomTellsTheEyeHeight) {

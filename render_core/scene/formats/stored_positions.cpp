@@ -1,4 +1,4 @@
-#include "render_core/scene/formats/stored_places.h"
+#include "render_core/scene/formats/stored_positions.h"
 
 #include <algorithm>
 #include <cassert>
@@ -20,7 +20,7 @@ constexpr float least_scale = 1e-10f;  // as in sanitize()
 
 }  // namespace
 
-StoredPlaces::StoredPlaces(const GaussianCloud& cloud, float (*stored)(float), float steps)
+StoredPositions::StoredPositions(const GaussianCloud& cloud, float (*stored)(float), float steps)
     : mean_(cloud.mean), scale_(cloud.scale) {
   assert(!cloud.empty());
   glm::vec3 low, high;
@@ -51,8 +51,8 @@ StoredPlaces::StoredPlaces(const GaussianCloud& cloud, float (*stored)(float), f
 
 /// The range of a coordinate without far Gaussians. `per_size`: the part of the stored range below
 /// which the median Gaussian's size has too few steps.
-StoredPlaces::Range StoredPlaces::range_of_most(int axis, float (*stored)(float),
-                                                float per_size) const {
+StoredPositions::Range StoredPositions::range_of_most(int axis, float (*stored)(float),
+                                                      float per_size) const {
   const std::size_t count = mean_.size();
   std::vector<float> at(count);
   for (std::size_t i = 0; i < count; ++i) at[i] = mean_[i][axis];

@@ -17,11 +17,11 @@ namespace catgs {
 /// background of more stays where it is, since cameras elsewhere would see it in front of things.
 /// The gap is wider than half of the others' range, and steps would otherwise be coarser than 1/256
 /// of the median Gaussian.
-class StoredPlaces {
+class StoredPositions {
  public:
   /// `stored`: what the format stores of a coordinate; it grows with it. `steps`: in its range.
   /// `cloud` is not empty, and must outlive the places.
-  StoredPlaces(const GaussianCloud& cloud, float (*stored)(float), float steps);
+  StoredPositions(const GaussianCloud& cloud, float (*stored)(float), float steps);
 
   [[nodiscard]] std::span<const glm::vec3> mean() const { return mean_; }
   [[nodiscard]] std::span<const glm::vec3> scale() const { return scale_; }
