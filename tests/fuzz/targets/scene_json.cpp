@@ -66,7 +66,8 @@ void parse_sidecar(Bytes input) {
   if (sidecar.near_z)
     require(*sidecar.near_z > 0.0f && *sidecar.near_z <= 1e9f, "near is in front of the camera");
   if (sidecar.limits)
-    require(is_position(sidecar.limits->min) && is_position(sidecar.limits->max), "limits are places");
+    require(is_position(sidecar.limits->min) && is_position(sidecar.limits->max),
+            "limits are places");
   if (sidecar.focus) require(is_position(*sidecar.focus), "the focus is a place");
   const SceneAbout& about = sidecar.about;
   for (const std::string& text : {about.title, about.credits, about.licence})
