@@ -9,6 +9,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/first_sight/lens.h"
 #include "render_core/math/look_at.h"
 
@@ -71,7 +72,7 @@ Content find_content(const VoxelGrid& grid, const Bounds& core) {
   std::size_t total = 0;
   for (const Group& group : groups) total += group.size();
 
-  const std::size_t step = total / max_positions + 1;
+  const EvenSample even(total, max_positions);
   const glm::vec3 first = grid.centre_of(groups.front().front());
   Content content{{first, first}, {}, radius};
   std::size_t next = 0;
@@ -80,7 +81,7 @@ Content find_content(const VoxelGrid& grid, const Bounds& core) {
       const glm::vec3 position = grid.centre_of(cell);
       content.bounds.min = glm::min(content.bounds.min, position);
       content.bounds.max = glm::max(content.bounds.max, position);
-      if (next++ % step == 0) content.positions.push_back(position);
+      if (even.contains(next++)) content.positions.push_back(position);
     }
   return content;
 }

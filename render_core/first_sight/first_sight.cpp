@@ -38,12 +38,15 @@ Sight best_inside(const std::vector<InnerView>& views, ViewJudge& judge) {
   constexpr float max_eye_heights = 4.0f;  // of the scale: halls are not crossed in a second
   Sight best;
   for (const InnerView& view : views) {
-    const Judgement seen = judge.judge(view.pose, 0.15f * view.ahead);
-    const float score = view.openness * seen.coverage * (1.0f - seen.veil) * seen.spread;
-    if (score <= best.score) continue;
+    const auto score_of = [&](const Judgement& seen) {
+      return view.openness * seen.coverage * (1.0f - seen.veil) * seen.spread;
+    };
+    const auto is_best = [&](const Judgement& seen) { return score_of(seen) > best.score; };
+    const Judgement seen = judge.judge(view.pose, 0.15f * view.ahead, is_best);
+    if (!is_best(seen)) continue;
     const glm::vec3 forward = view.pose.orientation * glm::vec3(0, 0, 1);
     const float scale = std::min(view.ahead, max_eye_heights * view.height);
-    best = {view.pose, view.pose.position + view.ahead * forward, scale, seen, score};
+    best = {view.pose, view.pose.position + view.ahead * forward, scale, seen, score_of(seen)};
   }
   return best;
 }
@@ -74,13 +77,17 @@ Sight best_around(const Content& content, float closer, const glm::vec3& up, Vie
       if (glm::dot(whole.pose.position, up) < low) continue;  // the ground would be in between
       const float forwards = (1.0f - closer) * whole.distance, ahead = closer * whole.distance;
       const Pose pose{whole.pose.position + forwards * forward, whole.pose.orientation};
+      const auto score_of = [&](const Judgement& seen) {
+        // Detail for its size: what is broad is not the front for that alone.
+        const float crowded = 1e-6f + seen.detail * seen.detail / (seen.coverage + 0.001f);
+        return crowded * (1.0f + seen.symmetry) * (1.0f - seen.veil) *
+               (1.0f + front_preference * std::cos(azimuth));
+      };
+      const auto is_best = [&](const Judgement& seen) { return score_of(seen) > best.score; };
       const Judgement seen =
-          judge.judge(pose, std::max(0.9f * whole.nearest - forwards, 0.1f * ahead));
-      // Detail for its size: what is broad is not the front for that alone.
-      const float crowded = 1e-6f + seen.detail * seen.detail / (seen.coverage + 0.001f);
-      const float score = crowded * (1.0f + seen.symmetry) * (1.0f - seen.veil) *
-                          (1.0f + front_preference * std::cos(azimuth));
-      if (score > best.score) best = {pose, pose.position + ahead * forward, ahead, seen, score};
+          judge.judge(pose, std::max(0.9f * whole.nearest - forwards, 0.1f * ahead), is_best);
+      if (is_best(seen))
+        best = {pose, pose.position + ahead * forward, ahead, seen, score_of(seen)};
     }
   return best;
 }

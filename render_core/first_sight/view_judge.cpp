@@ -129,20 +129,25 @@ void ViewJudge::draw(const Pose& pose, float near_z, std::vector<glm::vec3>& pix
     std::memcpy(&pixels[row * width_px], data + row * stride_bytes, width_px * sizeof(glm::vec3));
 }
 
-Judgement ViewJudge::judge(const Pose& pose, float near) {
+Judgement ViewJudge::judge(const Pose& pose, float near,
+                           const std::function<bool(const Judgement& unveiled)>& wanted) {
+  const auto pixels = static_cast<float>(picture_.size());
   draw(pose, 0.01f * near, picture_);
-  draw(pose, near, without_near_);
   Judgement seen{.symmetry = symmetry_of(picture_)};
-  for (std::size_t i = 0; i < picture_.size(); ++i) {
-    const glm::vec3 change = glm::abs(picture_[i] - without_near_[i]);
-    seen.coverage += picture_[i].y / static_cast<float>(picture_.size());
-    seen.veil += std::min(1.0f, 2.0f * std::max({change.x, change.y, change.z})) /
-                 static_cast<float>(picture_.size());
-  }
+  for (const glm::vec3& pixel : picture_) seen.coverage += pixel.y / pixels;
   const std::vector<float> blocks = detail_of(picture_);
   for (const float block : blocks) {
     seen.detail += block / static_cast<float>(blocks.size());
     seen.spread += std::sqrt(block) / static_cast<float>(blocks.size());
+  }
+  if (!wanted(seen)) {
+    seen.veil = 1.0f;
+    return seen;
+  }
+  draw(pose, near, without_near_);
+  for (std::size_t i = 0; i < picture_.size(); ++i) {
+    const glm::vec3 change = glm::abs(picture_[i] - without_near_[i]);
+    seen.veil += std::min(1.0f, 2.0f * std::max({change.x, change.y, change.z})) / pixels;
   }
   return seen;
 }

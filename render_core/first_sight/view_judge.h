@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -27,8 +28,10 @@ class ViewJudge {
   ViewJudge(const GaussianCloud& cloud, float stands_for, const Bounds& core,
             std::shared_ptr<ThreadPool> pool);
 
-  /// `near` (world units): what is nearer than that in front of the camera is a veil.
-  Judgement judge(const Pose& pose, float near);
+  /// `near` (world units): what is nearer than that in front of the camera is a veil. That takes a
+  /// second picture. It is not drawn, and all is veil, unless `wanted` is true without one.
+  Judgement judge(const Pose& pose, float near,
+                  const std::function<bool(const Judgement& unveiled)>& wanted);
 
  private:
   void draw(const Pose& pose, float near_z, std::vector<glm::vec3>& pixels);

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "render_core/base/even_sample.h"
+
 namespace catgs {
 namespace {
 
@@ -60,10 +62,9 @@ std::string TraceCheck::complaint() const {
 
 TraceCheck check_trace(const Trajectory& trajectory, std::span<const glm::vec3> means,
                        const ScenePosition& point, const Camera& lens, ThreadPool& pool) {
-  constexpr std::size_t max_sample = std::size_t{1} << 17;
-  const std::size_t step = std::max<std::size_t>(1, (means.size() + max_sample - 1) / max_sample);
+  const EvenSample even(means.size(), std::size_t{1} << 17);
   std::vector<glm::vec3> sample;
-  for (std::size_t i = 0; i < means.size(); i += step) sample.push_back(means[i]);
+  for (std::size_t k = 0; k < even.size(); ++k) sample.push_back(means[even[k]]);
 
   std::vector<std::size_t> in_view(trajectory.size());
   pool.parallel_for(trajectory.size(), [&](std::size_t i) {

@@ -42,8 +42,9 @@ struct SceneHints {
   glm::vec3 focus{0.0f};            // the point that orbiting turns around
   float scale = 1.0f;               // to a visitor, world units: how far free sight is, about
   SceneAbout about;
-  glm::dvec3 origin{0.0};  // places and the cloud are about it: see scene_origin.h
-  std::string source;      // "sidecar scene.json", "cameras.json", "estimated"; "" not looked for
+  glm::dvec3 origin{0.0};       // places and the cloud are about it: see scene_origin.h
+  bool up_is_doubtful = false;  // files like the scene's may be upside down, and nobody has said
+  std::string source;  // "sidecar scene.json", "cameras.json", "estimated"; "" not looked for
 };
 
 /// A scene ready to be rendered.

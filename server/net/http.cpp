@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 
+#include "render_core/base/content_hash.h"
+
 namespace catgs {
 namespace {
 
@@ -90,11 +92,8 @@ std::string_view authority_of(std::string_view origin) {
 
 }  // namespace
 
-/// FNV-1a, 64 bit. A deliberate collision would gain nothing.
 std::string etag_of(std::string_view content) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return fmt::format("\"{:016x}\"", hash);
+  return fmt::format("\"{:016x}\"", content_hash(content));
 }
 
 bool Precondition::holds(std::string_view current) const {

@@ -15,7 +15,7 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t most_view_bytes = 4096;
-constexpr std::string_view first_line = "catgs view 2\n";  // of a kept view
+constexpr std::string_view first_line = "catgs view 3\n";  // of a kept view
 
 /// The numbers of an estimate, in the order in which they are kept. They are about its origin.
 std::array<float*, 21> numbers_of(SceneHints& hints) {
@@ -31,7 +31,7 @@ std::string written(SceneHints hints) {
   std::string text(first_line);
   for (int axis = 0; axis < 3; ++axis) text += fmt::format("{}\n", hints.origin[axis]);
   for (const float* number : numbers_of(hints)) text += fmt::format("{}\n", *number);
-  return text;
+  return text + fmt::format("{:d}\n", hints.up_is_doubtful);
 }
 
 SceneHints read_view(std::string_view text, const std::string& name) {
@@ -48,6 +48,9 @@ SceneHints read_view(std::string_view text, const std::string& name) {
   };
   for (int axis = 0; axis < 3; ++axis) take(hints.origin[axis]);
   for (float* number : numbers_of(hints)) take(*number);
+  int doubtful = 0;
+  take(doubtful);
+  hints.up_is_doubtful = doubtful != 0;
   return hints;
 }
 

@@ -19,6 +19,7 @@ inline void use_hints(const SceneHints& hints, const std::string& name, SceneFac
   facts.near_z = hints.near_z;
   facts.scale = hints.scale;
   facts.origin = hints.origin;
+  facts.up_is_doubtful = hints.up_is_doubtful;
   facts.about = hints.about;
 }
 
@@ -32,6 +33,7 @@ inline SceneHints hints_of(const SceneFacts& facts) {
   hints.near_z = facts.near_z;
   hints.scale = facts.scale;
   hints.origin = facts.origin;
+  hints.up_is_doubtful = facts.up_is_doubtful;
   hints.about = facts.about;
   return hints;
 }

@@ -137,6 +137,24 @@ describe('keys', () => {
     await page.waitForFunction(() => document.fullscreenElement === null);
   });
 
+  it('turn a scene over that may be upside down, by the offer or by U', async () => {
+    const jpeg = await painted_jpeg();
+    const doubtful = await start_fake_server(stream_of(jpeg, { upIsDoubtful: true }));
+    watched = await open_page(doubtful.url, { viewport: { width: 640, height: 360 } });
+    const { page } = watched;
+    const start = await pose_of(page);
+    const offer = page.getByRole('button', { name: 'Turn upside down' });
+    await change_by(page, () => offer.click());
+    const turned = await pose_of(page);
+    expect(await page.locator('#notice').isHidden()).toBe(true);
+    await page.keyboard.press('KeyU');
+    await settle(page);
+    (await pose_of(page)).position.forEach((v, i) => expect(v).toBeCloseTo(start.position[i]!, 3));
+    await page.keyboard.press('KeyU');
+    await settle(page);
+    (await pose_of(page)).position.forEach((v, i) => expect(v).toBeCloseTo(turned.position[i]!, 3));
+  });
+
   it('reach every control by Tab, and each says what it is', async () => {
     const page = await open();
     const names = new Set<string>();

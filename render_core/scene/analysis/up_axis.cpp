@@ -213,21 +213,25 @@ Upright judge(const std::vector<Facet>& facets, const glm::vec3& up) {
 
 /// How usual it is that a scene has this up: captures of COLMAP have y down, surveys have z up,
 /// some tools turn y up.
-float habit(const glm::vec3& up) {
-  return std::max(
-      {0.3f, -up.y * std::abs(up.y), 0.6f * up.z * std::abs(up.z), 0.4f * up.y * std::abs(up.y)});
+float habit(const glm::vec3& up, UsualUp usual) {
+  const float y_down = usual == UsualUp::plus_z ? 0.6f : 1.0f;
+  const float y_up = usual == UsualUp::either_y ? 1.0f : 0.4f;
+  const float z_up = usual == UsualUp::plus_z ? 1.0f : 0.6f;
+  return std::max({0.3f, -y_down * up.y * std::abs(up.y), z_up * up.z * std::abs(up.z),
+                   y_up * up.y * std::abs(up.y)});
 }
 
 /// The axis on which the largest floor lies, in the sense that the content tells. Without a floor
 /// the usual axis.
-glm::vec3 upright_axis(const std::vector<Facet>& facets) {
-  if (facets.empty()) return usual_up;
+glm::vec3 upright_axis(const std::vector<Facet>& facets, UsualUp usual) {
+  const glm::vec3 first = usual == UsualUp::plus_z ? glm::vec3(0, 0, 1) : usual_up;
+  if (facets.empty()) return first;
   constexpr float trust = 2.5f, most = 0.6f;
   const auto factor = [&](float sense) { return std::exp(trust * std::clamp(sense, -most, most)); };
-  glm::vec3 best = usual_up;
+  glm::vec3 best = first;
   float best_score = 0.0f;
   const auto consider = [&](const glm::vec3& axis, float floor, float sense) {
-    const float score = habit(axis) * floor * factor(sense);
+    const float score = habit(axis, usual) * floor * factor(sense);
     if (score <= best_score) return;
     best_score = score;
     best = axis;
@@ -247,13 +251,13 @@ glm::vec3 upright_axis(const std::vector<Facet>& facets) {
     const auto [floor, sense] = judge(facets, axis);
     if (floor < smallest_floor) continue;
     for (const float sign : {1.0f, -1.0f})
-      if (habit(sign * axis) * floor * std::max(1.0f, factor(sign * sense)) > smallest_floor)
+      if (habit(sign * axis, usual) * floor * std::max(1.0f, factor(sign * sense)) > smallest_floor)
         consider(sign * axis, floor, sign * sense);
   }
   if (best_score > 0.0f) return best;
-  const float sense = judge(facets, usual_up).sense;
-  consider(usual_up, 1.0f, sense);
-  consider(-usual_up, 1.0f, -sense);
+  const float sense = judge(facets, first).sense;
+  consider(first, 1.0f, sense);
+  consider(-first, 1.0f, -sense);
   return best;
 }
 
@@ -298,14 +302,15 @@ glm::vec3 level(const glm::vec3& guess, const std::vector<Facet>& facets,
 
 }  // namespace
 
-glm::vec3 find_up(const GaussianCloud& cloud, std::span<const Pose> cameras, float stands_for) {
+glm::vec3 find_up(const GaussianCloud& cloud, std::span<const Pose> cameras, float stands_for,
+                  UsualUp usual) {
   std::vector<Facet> facets;
   if (const auto bounds = robust_bounds(cloud, 0.01f))
     facets = sample_facets(cloud, stands_for, *bounds);
   const glm::vec3 held = mean_up(cameras);
   if (glm::length(held) < 0.2f) cameras = {};  // none, or those of a drone that looks straight down
   const glm::vec3 guess =
-      cameras.empty() ? upright_axis(facets) : level(glm::normalize(held), {}, cameras);
+      cameras.empty() ? upright_axis(facets, usual) : level(glm::normalize(held), {}, cameras);
   // The surfaces of a thing without a floor are level by chance only.
   const auto axis = peak_near(facets, guess);
   const bool has_floor =

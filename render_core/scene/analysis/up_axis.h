@@ -4,6 +4,7 @@
 
 #include "render_core/math/camera.h"
 #include "render_core/scene/gaussian_cloud.h"
+#include "render_core/scene/usual_up.h"
 
 namespace catgs {
 
@@ -13,8 +14,8 @@ namespace catgs {
 /// tells its sense. The usual ones (-y, then +z) win ties. Without a floor it is -y or y. All are
 /// levelled by the floors and walls near to them. Deterministic, and the same for every level of
 /// detail and order of a scene, up to noise. `stands_for`: of an even sample, so many Gaussians of
-/// the scene each.
+/// the scene each. `usual`: of its file.
 glm::vec3 find_up(const GaussianCloud& cloud, std::span<const Pose> cameras,
-                  float stands_for = 1.0f);
+                  float stands_for = 1.0f, UsualUp usual = UsualUp::minus_y);
 
 }  // namespace catgs

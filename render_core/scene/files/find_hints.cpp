@@ -150,9 +150,11 @@ SceneHints find_hints(const std::function<ViewSample()>& sample, const HintFiles
   if (!told) told = up;
   const auto estimate = [&] {
     const auto [cloud, stands_for] = sample();
-    const glm::vec3 found = told ? *told : find_up(cloud, cameras.poses, stands_for);
+    const glm::vec3 found =
+        told ? *told : find_up(cloud, cameras.poses, stands_for, files.usual_up);
     SceneHints hints = estimate_hints(cloud, found, pool, stands_for);
     hints.origin = files.origin;
+    hints.up_is_doubtful = files.usual_up == UsualUp::either_y && !told && cameras.poses.empty();
     return hints;
   };
   SceneHints hints = keep ? keep(estimate) : estimate();

@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "render_core/base/content_hash.h"
 #include "render_core/base/error.h"
 #include "render_core/base/part_file.h"
 #include "render_core/base/printable.h"
@@ -22,6 +23,13 @@ namespace catgs {
 namespace {
 
 constexpr std::size_t max_about_bytes = 800;  // of one text: 200 characters or more
+constexpr const char* hash_field = "convert_hash";
+
+/// A hash of the fields of a sidecar, without that of the hash itself.
+std::string hash_of(nlohmann::json document) {
+  document.erase(hash_field);
+  return fmt::format("{:016x}", content_hash(document.dump()));
+}
 
 glm::vec3 parse_up(const JsonField& field) {
   if (field.value().is_string()) {
@@ -100,8 +108,8 @@ Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin) {
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
   static constexpr std::array known = {
-      "up",      "start_pose", "near",       "limits", "focus", "title",          "credits",
-      "licence", "mode",       "background", "model",  "tours", "metres_per_unit"};
+      "up",      "start_pose", "near",       "limits", "focus", "title",           "credits",
+      "licence", "mode",       "background", "model",  "tours", "metres_per_unit", hash_field};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -137,6 +145,7 @@ void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hi
                                       : Pose{start->position, start->orientation};
     if (start->look_at && !sidecar.focus) hints.focus = *start->look_at;
   }
+  hints.up_is_doubtful = hints.up_is_doubtful && !sidecar.up && !sidecar.start_pose;
   hints.about = sidecar.about;
   hints.source = fmt::format("sidecar {}", name);
 }
@@ -157,6 +166,16 @@ nlohmann::ordered_json json_location(const glm::vec3& point, const glm::dvec3& o
 
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file) {
   return std::filesystem::path(scene_file).replace_extension(".json");
+}
+
+bool is_unedited(const std::filesystem::path& sidecar) {
+  try {
+    const nlohmann::json document = read_json(FileSource(sidecar), max_sidecar_bytes);
+    return document.is_object() &&
+           document.value(hash_field, nlohmann::json()) == hash_of(document);
+  } catch (const InputError&) {
+    return false;  // convert writes no such file
+  }
 }
 
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
@@ -183,6 +202,7 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
   if (about.metres_per_unit != 0.0f) document["metres_per_unit"] = about.metres_per_unit;
   if (tours && !tours->is_null()) document["tours"] = *tours;
+  document[hash_field] = hash_of(nlohmann::json::parse(document.dump()));
   PartFile file(path);  // a server may read it meanwhile
   file.stream() << document.dump(2) << '\n';
   file.finish();

@@ -16,6 +16,7 @@
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/orbit_limits.h"
 #include "render_core/scene/scene.h"
+#include "render_core/scene/usual_up.h"
 
 namespace catgs {
 
@@ -37,6 +38,7 @@ inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 ///   "metres_per_unit": length of a world unit
 ///   "model":      "default", "antialiased" or "2dgs", in place of what the scene's file says
 ///   "tours":      for pages, see web_client/TOURS.md
+///   "convert_hash": of all other fields as catgs-render convert wrote them, see is_unedited()
 struct Sidecar {
   struct StartPose {
     glm::vec3 position{0.0f};
@@ -64,6 +66,9 @@ void use_sidecar(const Sidecar& sidecar, const std::string& name, SceneHints& hi
 /// The path of a scene file's sidecar: "city.ply" -> "city.json".
 std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 
+/// Whether a sidecar is as write_sidecar() has written it, so that nothing of an author is in it.
+bool is_unedited(const std::filesystem::path& sidecar);
+
 /// Writes all hints as a sidecar, and the value of its "tours" if there is one. Throws InputError
 /// when that fails.
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
@@ -77,6 +82,7 @@ struct HintFiles {
   std::optional<OrbitLimits> orbit{};  // of the scene's file
   std::filesystem::path test_views{};  // transforms_test.json of a data set
   glm::dvec3 origin{0.0};              // of the scene; the files count from 0
+  UsualUp usual_up = UsualUp::minus_y;
 };
 
 /// Whether they tell anything: a file is there, or an orbit.

@@ -51,6 +51,7 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
   HintFiles hints = location.hints;
   hints.orbit = decoded.orbit;
   hints.origin = decoded.origin;
+  hints.usual_up = decoded.usual_up;
   if (!location.is_in_pages()) {  // whose pages are about the origin that their header has
     const glm::dvec3 left = find_origin(scene.cloud.mean);
     move_origin(scene.cloud, left);

@@ -82,6 +82,7 @@ std::optional<PartedScene> scene_in_parts(const SceneLocation& location, const L
   };
   HintFiles hints = location.hints;
   hints.origin = parts->origin;
+  hints.usual_up = parts->usual_up;
   if (wants_hints && !sample.empty())
     scene.hints = find_hints(sample_all, hints, options.up, scene.notes, pool, options.keep_view);
   scene.hints.origin = scene.parts.origin = parts->origin;

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
@@ -137,10 +138,11 @@ Lens read_lens(const JsonField& camera, const JsonField& file) {
   constexpr double max_side_px = 1 << 20, least_focal_px = 1e-6;
   constexpr double degree = std::numbers::pi / 180.0;
   const Numbers of{camera, file};
-  const glm::dvec2 size_px{of.positive({"w", "width", "render_width"}),
-                           of.positive({"h", "height", "render_height"})};
+  glm::dvec2 size_px{of.positive({"w", "width", "render_width"}),
+                     of.positive({"h", "height", "render_height"})};
   const glm::dvec2 focal_px{of.positive({"fl_x", "fx"}), of.positive({"fl_y", "fy"})};
   const glm::dvec2 centre_px{of.positive({"cx"}), of.positive({"cy"})};
+  if (size_px == glm::dvec2(0.0)) size_px = glm::round(2.0 * centre_px);
   glm::dvec2 angle_rad{of.positive({"camera_angle_x"}), of.positive({"camera_angle_y"})};
   if (angle_rad.x == 0.0) angle_rad.x = degree * of.positive({"x_fov"});
   if (angle_rad.y == 0.0) angle_rad.y = degree * of.positive({"y_fov", "fov", "default_fov"});

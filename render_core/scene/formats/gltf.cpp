@@ -41,6 +41,7 @@ struct Part {
   int sh_degree = 0;        // of the part as loaded
   GltfAccessor mean, rotation, scale, opacity;
   std::vector<GltfAccessor> sh;  // by coefficient
+  bool is_draft = false;         // then `opacity` is of colours with alpha, and sh[0] is not there
   GltfBytes spz;                 // holds all of these, if it has a file
   bool linear_colours = false;
 };
@@ -73,8 +74,12 @@ std::string attribute_name(std::string_view name) {
   return fmt::format("{}:{}", extension_name, name);
 }
 
-std::string sh_name(int degree, int k) {
-  return attribute_name(fmt::format("SH_DEGREE_{}_COEF_{}", degree, k));
+std::string sh_name(int degree, int k) { return fmt::format("SH_DEGREE_{}_COEF_{}", degree, k); }
+
+/// Drafts of 2024 and 2025 name attributes of their own with an underscore, and have the diffuse
+/// colour and the opacity in COLOR_0.
+bool is_draft(const JsonField& attributes) {
+  return attributes.find("_SCALE") && !attributes.find(attribute_name("SCALE"));
 }
 
 GltfAccessor attribute(GltfDocument& document, const JsonField& attributes, std::string_view name,
@@ -147,10 +152,20 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
     contents.statements.read_members(extras->value());
   if (const auto spz = spz_of(primitive))
     return parse_spz_part(document, *spz, extension, contents);
-  static_cast<void>(extension.at("kernel"));
   Part part;
-  part.linear_colours = has_linear_colours(extension.at("colorSpace"), contents);
   const JsonField attributes = primitive.at("attributes");
+  part.is_draft = is_draft(attributes);
+  if (part.is_draft) {
+    contents.note("it follows a draft of the extension: COLOR_0 is taken as what displays show");
+    if (const auto scale = extension.find("quantizedPositionScale"); scale && scale->number() != 1)
+      scale->fail("is not supported", "export positions as floats");
+  } else {
+    static_cast<void>(extension.at("kernel"));
+    part.linear_colours = has_linear_colours(extension.at("colorSpace"), contents);
+  }
+  const auto name_of = [&](std::string_view name) {
+    return part.is_draft ? fmt::format("_{}", name) : attribute_name(name);
+  };
   const auto read = [&](std::string_view name, std::size_t columns, unsigned kinds) {
     const GltfAccessor accessor = attribute(document, attributes, name, columns, kinds);
     if (part.mean.count > 0 && accessor.count != part.mean.count)
@@ -160,16 +175,22 @@ Part parse_part(GltfDocument& document, const JsonField& primitive, const JsonFi
   };
   // Positions may have all types of KHR_mesh_quantization.
   part.mean = read("POSITION", 3, floats | signed_fractions | fractions | counts | signed_counts);
-  part.rotation = read(attribute_name("ROTATION"), 4, floats | signed_fractions);
-  part.scale = read(attribute_name("SCALE"), 3, floats | counts | fractions | signed_fractions);
-  part.opacity = read(attribute_name("OPACITY"), 1, floats | fractions);
+  part.rotation = read(name_of("ROTATION"), 4, floats | signed_fractions);
+  part.scale = read(name_of("SCALE"), 3, floats | counts | fractions | signed_fractions);
   constexpr unsigned harmonics = floats | fractions | signed_fractions;
-  part.sh.push_back(read(sh_name(0, 0), 3, harmonics));
+  if (part.is_draft) {
+    part.opacity = read("COLOR_0", 4, floats | fractions);
+    part.sh.emplace_back();
+  } else {
+    part.opacity = read(name_of("OPACITY"), 1, floats | fractions);
+    part.sh.push_back(read(name_of(sh_name(0, 0)), 3, harmonics));
+  }
   for (int degree = 1; degree <= max_sh_degree; ++degree) {
-    if (!attributes.find(sh_name(degree, 0))) continue;
+    if (!attributes.find(name_of(sh_name(degree, 0)))) continue;
     if (part.sh.size() != static_cast<std::size_t>(degree * degree))
       attributes.fail(fmt::format("has harmonics of degree {} and not of all below", degree));
-    for (int k = 0; k <= 2 * degree; ++k) part.sh.push_back(read(sh_name(degree, k), 3, harmonics));
+    for (int k = 0; k <= 2 * degree; ++k)
+      part.sh.push_back(read(name_of(sh_name(degree, k)), 3, harmonics));
   }
   part.count = part.mean.count;
   part.sh_degree = sh_degree_of_rest(part.sh.size() - 1);
@@ -214,6 +235,8 @@ void add_mesh(GltfDocument& document, const JsonField& node, const AffineMap& ma
     if (contents.parts.size() == max_parts)
       primitive.fail(fmt::format("is one of more than {} at nodes", max_parts));
     if (!map.usable()) node.fail("has a transform without an inverse");
+    if (const auto own = node.find("extensions"); own && own->find("EXT_mesh_gpu_instancing"))
+      contents.note("its instances (EXT_mesh_gpu_instancing) are not shown, only the mesh itself");
     Part part = parse_part(document, primitive, *extension, contents);
     part.map = map;
     contents.size.count += part.count;
@@ -333,7 +356,7 @@ void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
     const auto vec3_at = [](const std::vector<float>& rows, std::size_t i) {
       return glm::vec3(rows[3 * i], rows[3 * i + 1], rows[3 * i + 2]);
     };
-    for (std::size_t k = 0; k < part.sh.size(); ++k) {
+    for (std::size_t k = part.is_draft ? 1 : 0; k < part.sh.size(); ++k) {
       const std::vector<float> sh = part.sh[k].read(begin, end);
       for (std::size_t i = 0; i < end - begin; ++i)
         cloud.sh[(first + begin + i) * stride + k] = vec3_at(sh, i);
@@ -344,7 +367,11 @@ void read_part(const Part& part, std::size_t first, GaussianCloud& cloud,
       cloud.mean[to] = vec3_at(mean, i);
       cloud.rotation[to] = unit(glm::quat(q[3], q[0], q[1], q[2]));
       cloud.scale[to] = vec3_at(scale, i);
-      cloud.opacity[to] = opacity[i] == 1.0f ? max_opacity : opacity[i];
+      const float alpha = part.is_draft ? opacity[4 * i + 3] : opacity[i];
+      cloud.opacity[to] = alpha == 1.0f ? max_opacity : alpha;
+      if (part.is_draft)
+        for (int c = 0; c < 3; ++c)
+          cloud.sh[to * stride][c] = sh_from_colour(opacity[4 * i + static_cast<std::size_t>(c)]);
       finish(part, transform, to, cloud);
     }
   });

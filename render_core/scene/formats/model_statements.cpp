@@ -87,6 +87,7 @@ void add_unclear(std::vector<std::string>& notes, std::string_view text) {
 void ModelStatements::read(std::string_view text) {
   if (text.size() > most_text) return;
   const std::vector<std::string> words = words_of(text);
+  if (words == std::vector<std::string>{"vertical", "axis", "z"}) usual_up = UsualUp::plus_z;
   const auto stated = model_stated(words);
   if (stated) model = stated;
   // "mip0.1" tells the width of the filter, too, and that is always ours.

@@ -231,6 +231,8 @@ class AsciiNumbers {
     }
     double value = 0.0;
     const char* buffer_end = buffer_.data() + end_;
+    // from_chars() knows no plus sign, which some programs write.
+    if (end_ - at_ > 1 && buffer_[at_] == '+' && buffer_[at_ + 1] != '-') ++at_;
     const auto [last, error] = std::from_chars(buffer_.data() + at_, buffer_end, value);
     if (error == std::errc::invalid_argument || (last != buffer_end && !is_space(*last)))
       throw InputError(file_.name(), fmt::format("byte {}", next_read_ - (end_ - at_)),
@@ -360,7 +362,10 @@ DecodedScene read_any_ply(const SceneFiles& files, const LoadContext& context) {
     });
   const auto read = [&](const glm::dvec3& origin) -> DecodedScene {
     GaussianCloud cloud = read_ply(file, header, context, origin);
-    return {"3DGS ply", std::move(cloud), notes_of(header)};
+    return {.format = "3DGS ply",
+            .cloud = std::move(cloud),
+            .notes = notes_of(header),
+            .usual_up = header.statements.usual_up};
   };
   const PlyElement* vertex = header.find("vertex");
   if (header.encoding == PlyEncoding::ascii) return read_about_origin(read);
@@ -386,7 +391,10 @@ std::optional<DecodedParts> ply_in_parts(const SceneFiles& files, std::uint64_t 
                         const LoadContext& reading) {
     return read_ply_rows(*file, *header, rows, reading, origin);
   };
-  return parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*header));
+  DecodedParts parts =
+      parts_of_rows("3DGS ply", vertex->count, part_rows, read, context, notes_of(*header));
+  parts.usual_up = header->statements.usual_up;
+  return parts;
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "render_core/base/even_sample.h"
+
 namespace catgs {
 
 std::shared_ptr<const FileSet> SceneFiles::open(std::string_view only) const {
@@ -11,8 +13,8 @@ std::shared_ptr<const FileSet> SceneFiles::open(std::string_view only) const {
 }
 
 FileRows even_sample(std::uint64_t rows) {
-  const std::uint64_t step = (rows + most_origin_positions - 1) / most_origin_positions;
-  return {0, step == 0 ? 0 : (rows + step - 1) / step, step};
+  const EvenSample even(rows, most_origin_positions);
+  return {0, even.size(), even.step()};
 }
 
 DecodedParts parts_of_rows(

@@ -20,6 +20,7 @@
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/orbit_limits.h"
 #include "render_core/scene/scene_origin.h"
+#include "render_core/scene/usual_up.h"
 
 namespace catgs {
 
@@ -53,6 +54,7 @@ struct DecodedScene {
   std::vector<std::string> notes{};  // as Scene::notes
   std::optional<OrbitLimits> orbit{};
   glm::dvec3 origin{0.0};  // that `cloud` is about, where the format is more exact than floats
+  UsualUp usual_up = UsualUp::minus_y;
 };
 
 /// Reads a scene about 0, and again about its origin where that lies elsewhere. `read(origin)`
@@ -78,6 +80,7 @@ struct DecodedParts {
   GaussianCloud sample;            // an even one of at most `most_sampled`
   std::vector<std::string> notes;  // as Scene::notes
   glm::dvec3 origin{0.0};          // that the parts and the sample are about
+  UsualUp usual_up = UsualUp::minus_y;
 };
 
 /// An even sample of a file's rows, of most_origin_places at most.

@@ -265,7 +265,8 @@ void finish(SpzFile& file, Extensions extensions, SpzAxes axes, const LoadContex
   for (const std::string& note : extensions.notes) add_note(file.notes, note);
   if (axes == SpzAxes::as_stored) return;
   turn(extensions.system.value_or(right_up_back_system), file.cloud, context);
-  if (extensions.system) return;
+  file.names_axes = extensions.system.has_value();
+  if (file.names_axes) return;
   add_note(
       file.notes,
       "it does not name its axes, so y points up, as SPZ has it. splat-transform 3, Spark and "
@@ -367,8 +368,12 @@ constexpr SceneFormat spz_format = {
     .read = [](const SceneFiles& files, const LoadContext& context) -> DecodedScene {
       SpzFile spz = read_spz(FileSource(files.path), context);
       for (const std::string& note : notes_of_degree(spz.sh_degree)) add_note(spz.notes, note);
-      return {fmt::format("spz v{}", spz.version), std::move(spz.cloud), std::move(spz.notes),
-              spz.orbit};
+      return {fmt::format("spz v{}", spz.version),
+              std::move(spz.cloud),
+              std::move(spz.notes),
+              spz.orbit,
+              glm::dvec3(0.0),
+              spz.names_axes ? UsualUp::minus_y : UsualUp::either_y};
     },
     .write = [](const GaussianCloud& cloud, const glm::dvec3&, ThreadPool&,
                 std::ostream& to) { write_spz(cloud, to); },

@@ -27,6 +27,7 @@ struct SpzFile {
   GaussianCloud cloud;                 // not sanitized; SH above degree 3 is cut off
   std::optional<OrbitLimits> orbit{};  // of the extension SPZ_ADOBE_safe_orbit_camera
   std::vector<std::string> notes{};    // for people
+  bool names_axes = false;             // by the extension SPZ_ADOBE_coordinate_system
 };
 
 /// Whether the file begins like an .spz: gzip or the plain header of version 4.

@@ -27,6 +27,7 @@ struct CompareOptions {
   std::string a, b;
   bool json = false;
   std::optional<double> required_psnr_db;
+  bool same_cameras = false;
 };
 
 /// The picture of a comparison whose cameras are the farthest apart, if any are.
@@ -51,6 +52,7 @@ class CameraCheck {
                "path.tum\n",
                count_, printable(name_), worst_->units, worst_->degrees, worst_->pixels);
   }
+  [[nodiscard]] bool differ() const { return worst_.has_value(); }
   [[nodiscard]] nlohmann::ordered_json json() const {
     if (!worst_) return nullptr;
     return {{"pictures", count_},
@@ -146,9 +148,8 @@ std::vector<NamedQuality> compare_folders(const CompareOptions& options, std::si
 }
 
 /// Returns the mean PSNR.
-double report_folders(const CompareOptions& options) {
+double report_folders(const CompareOptions& options, CameraCheck& cameras) {
   std::size_t left_out = 0;
-  CameraCheck cameras;
   const std::vector<NamedQuality> all = compare_folders(options, left_out, cameras);
   cameras.warn();
   if (options.json) {
@@ -175,9 +176,8 @@ double report_folders(const CompareOptions& options) {
 }
 
 /// Returns the PSNR.
-double report_pair(const CompareOptions& options) {
+double report_pair(const CompareOptions& options, CameraCheck& cameras) {
   const ImageQuality quality = compare_pair(options.a, options.b);
-  CameraCheck cameras;
   cameras.add(options.a, options.a, options.b);
   cameras.warn();
   if (options.json) {
@@ -194,7 +194,10 @@ void compare(const CompareOptions& options) {
   if (folders != std::filesystem::is_directory(options.b, error))
     throw InputError(options.b, "", "one is a folder and the other is not",
                      "two pictures or two folders");
-  const double psnr = folders ? report_folders(options) : report_pair(options);
+  CameraCheck cameras;
+  const double psnr = folders ? report_folders(options, cameras) : report_pair(options, cameras);
+  if (options.same_cameras && cameras.differ())
+    throw CheckFailed("pictures were drawn by different cameras, so their difference tells little");
   if (options.required_psnr_db && !(psnr >= *options.required_psnr_db)) {
     throw CheckFailed(fmt::format("PSNR is {:.2f} dB, below the required {:.2f} dB", psnr,
                                   *options.required_psnr_db));
@@ -214,6 +217,8 @@ void add_compare_command(CLI::App& app) {
   command->add_flag("--json", options->json, "Print JSON");
   command->add_option("--require-psnr", options->required_psnr_db,
                       "Exit with 1 if the PSNR, of folders its mean, is below this many dB");
+  command->add_flag("--require-same-cameras", options->same_cameras,
+                    "Exit with 1 if pictures of frames tell cameras that differ");
   command->callback([options] { compare(*options); });
 }
 

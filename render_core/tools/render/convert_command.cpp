@@ -98,26 +98,40 @@ SceneHints hints_of_output(const SceneHints& hints, const Conversion& conversion
   return written;
 }
 
-/// Refuses a sidecar that is there and tells another view than that of the moved scene.
-void check_sidecar_fits(const SceneHints& hints, const Conversion& conversion,
-                        const EditAboutOrigin& done) {
-  const auto sidecar = sidecar_of(conversion.options.out);
-  std::error_code error;
-  if (!moves(conversion, done) || !std::filesystem::exists(sidecar, error)) return;
-  const SceneHints moved = hints_of_output(hints, conversion, done);
+/// Whether a sidecar that is there leaves the hints of the output as they are.
+bool tells_hints(const std::filesystem::path& sidecar, const SceneHints& moved) {
   SceneHints there = moved;
-  use_sidecar(read_sidecar(FileSource(sidecar), moved.origin), sidecar.string(), there);
+  try {
+    use_sidecar(read_sidecar(FileSource(sidecar), moved.origin), sidecar.string(), there);
+  } catch (const InputError&) {
+    return false;  // whatever it means to tell
+  }
   const float tolerance = 1e-5f * (1.0f + glm::distance(moved.limits.min, moved.limits.max));
   const auto same = [&](const glm::vec3& a, const glm::vec3& b) {
     return glm::distance(a, b) <= tolerance;
   };
   const glm::quat &was = moved.start_pose.orientation, &is = there.start_pose.orientation;
-  if (same(moved.start_pose.position, there.start_pose.position) &&
-      std::abs(glm::dot(was, is)) > 1.0f - 1e-5f && same(moved.focus, there.focus) &&
-      same(moved.limits.min, there.limits.min) && same(moved.limits.max, there.limits.max) &&
-      glm::distance(moved.up, there.up) < 1e-4f &&
-      std::abs(moved.near_z - there.near_z) <= tolerance)
-    return;
+  return same(moved.start_pose.position, there.start_pose.position) &&
+         std::abs(glm::dot(was, is)) > 1.0f - 1e-5f && same(moved.focus, there.focus) &&
+         same(moved.limits.min, there.limits.min) && same(moved.limits.max, there.limits.max) &&
+         glm::distance(moved.up, there.up) < 1e-4f &&
+         std::abs(moved.near_z - there.near_z) <= tolerance;
+}
+
+/// Whether the sidecar that is there stays: an author has changed it, or the input has it, too.
+bool keeps_sidecar(const Conversion& conversion) {
+  const auto sidecar = sidecar_of(conversion.options.out);
+  std::error_code error;
+  return std::filesystem::exists(sidecar, error) &&
+         (shares_sidecar(conversion) || !is_unedited(sidecar));
+}
+
+/// Refuses a sidecar that stays and tells another view than that of the moved scene.
+void check_sidecar_fits(const SceneHints& hints, const Conversion& conversion,
+                        const EditAboutOrigin& done) {
+  if (!moves(conversion, done) || !keeps_sidecar(conversion)) return;
+  const auto sidecar = sidecar_of(conversion.options.out);
+  if (tells_hints(sidecar, hints_of_output(hints, conversion, done))) return;
   throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
                    "give the output another name, or move the file away");
 }
@@ -127,16 +141,18 @@ void check_sidecar_fits(const SceneHints& hints, const Conversion& conversion,
 void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
                         const EditAboutOrigin& done) {
   const auto sidecar = sidecar_of(conversion.options.out);
-  std::error_code error;
-  const bool there = std::filesystem::exists(sidecar, error);
-  if (there || (moves(conversion, done) && shares_sidecar(conversion))) {
-    fmt::print(stderr, "note: {} {}\n", printable(sidecar.string()),
-               there ? "exists and was left as it is"
-                     : "was not written, since it would be the input's, too");
-    return;
-  }
-  nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
   const SceneHints written = hints_of_output(hints, conversion, done);
+  const auto leave = [&](std::string_view why) {
+    fmt::print(stderr, "note: {} {}\n", printable(sidecar.string()), why);
+  };
+  if (keeps_sidecar(conversion))
+    return leave(shares_sidecar(conversion) || tells_hints(sidecar, written)
+                     ? "exists and was left as it is"
+                     : "exists and was left as it is, since an author changed it. What it tells of "
+                       "the view may be of another scene: look, or move it away and convert again");
+  if (moves(conversion, done) && shares_sidecar(conversion))
+    return leave("was not written, since it would be the input's, too");
+  nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
   Placement placement = conversion.edit.placement;
   if (!keeps_origin(conversion.options.out)) placement.offset -= done.origin;
   if (placement.moves()) place_tours(tours, placement, written.origin);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
+#include "render_core/base/even_sample.h"
 #include "render_core/scene/analysis/robust_bounds.h"
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/tour_check.h"
@@ -39,10 +40,9 @@ Json triple(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 /// Quantiles of value(i) over an even sample of the Gaussians.
 template <class Value>
 Json quantiles(const GaussianCloud& cloud, const Value& value) {
-  constexpr std::size_t max_sample = 1 << 20;
-  const std::size_t step = (cloud.size() + max_sample - 1) / max_sample;
+  const EvenSample even(cloud.size(), 1 << 20);
   std::vector<float> values;
-  for (std::size_t i = 0; i < cloud.size(); i += step) values.push_back(value(i));
+  for (std::size_t k = 0; k < even.size(); ++k) values.push_back(value(even[k]));
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) {
     return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];

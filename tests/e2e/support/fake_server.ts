@@ -142,7 +142,7 @@ function make_peer(socket: WebSocket): Peer {
 }
 
 /** A welcome to a small scene whose pictures are JPEGs of 640x360. */
-export function welcome(): ServerBody {
+export function welcome(scene: { readonly upIsDoubtful?: boolean } = {}): ServerBody {
   return {
     case: 'welcome',
     value: {
@@ -159,6 +159,7 @@ export function welcome(): ServerBody {
         limitsMin: { x: -20, y: -20, z: -20 },
         limitsMax: { x: 20, y: 20, z: 20 },
         nearZ: 0.2,
+        ...scene,
       },
       config: {
         codec: Codec.MJPEG,

@@ -28,9 +28,9 @@ export async function painted_jpeg(): Promise<Uint8Array> {
 
 /** Sends a welcome, and answers every pose with the picture. */
 export const stream_of =
-  (jpeg: Uint8Array): Script =>
+  (jpeg: Uint8Array, scene: Parameters<typeof welcome>[0] = {}): Script =>
   (peer, body) => {
-    if (body.case === 'hello') peer.say(welcome());
+    if (body.case === 'hello') peer.say(welcome(scene));
     if (body.case !== 'pose') return;
     peer.frame(
       {

@@ -112,6 +112,7 @@ TEST(Wire, EveryServerMessageReadsBack) {
   welcome.scene.focus = {1.0f, 2.0f, 3.0f};
   welcome.scene.model = SplatModel::antialiased;
   welcome.scene.about = {"The city", "Ada", "MIT", CameraMode::walk, 0x0a10ff, 0.25f};
+  welcome.scene.up_is_doubtful = true;
   welcome.scene.origin = {500123.0, 5412345.0, 431.0};
   welcome.scene_ids = {"city", "garden"};
   const auto greeting = reread(welcome).welcome();
@@ -125,6 +126,7 @@ TEST(Wire, EveryServerMessageReadsBack) {
   EXPECT_EQ(greeting.scene().background_rgb(), 0x0a10ffu);
   EXPECT_EQ(greeting.scene().metres_per_unit(), 0.25f);
   EXPECT_EQ(greeting.scene().origin().y(), 5412345.0);
+  EXPECT_TRUE(greeting.scene().up_is_doubtful());
   EXPECT_FALSE(reread(Welcome()).welcome().scene().has_origin());
   EXPECT_EQ(greeting.scene_ids(1), "garden");
   EXPECT_EQ(reread(Stats{.fps = 12.5f, .sessions = 4}).stats().sessions(), 4u);

@@ -57,6 +57,7 @@ TEST_F(DerivedFilesTest, FirstViewsAreKeptWhateverIsLoaded) {
       hints.up = {0.6f, 0.0f, 0.8f};
       hints.start_pose.position = {1e9f, -1.0f / 3.0f, 1e-9f};
       hints.limits.max = {7, 8, 9};
+      hints.up_is_doubtful = true;
       return hints;
     });
   };
@@ -70,6 +71,7 @@ TEST_F(DerivedFilesTest, FirstViewsAreKeptWhateverIsLoaded) {
   EXPECT_EQ(again.up, first.up);
   EXPECT_EQ(again.start_pose.position, first.start_pose.position);
   EXPECT_EQ(again.limits.max, first.limits.max);
+  EXPECT_TRUE(again.up_is_doubtful);
   EXPECT_EQ(again.source, "estimated");
   for (const auto& entry : fs::directory_iterator(trees_))
     if (entry.path().extension() == ".view") fs::resize_file(entry.path(), 40);

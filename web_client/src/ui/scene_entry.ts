@@ -34,6 +34,7 @@ export class SceneEntry {
   ) {
     const { travel, views } = parts_;
     page_.navigation.entered.listen(({ scene }) => void this.enter(scene));
+    page_.navigation.up_changed.listen(() => page_.notice.withdraw(text.quality.up_doubtful));
     window.addEventListener('hashchange', () => {
       if (travel.leads_elsewhere) return;
       const shared = read_shared(location.href);
@@ -50,6 +51,11 @@ export class SceneEntry {
     const load = ++this.loads_;
     const shared = travel.arrive(scene_id) ?? read_shared(location.href);
     views.show(shared);
+    if (scene.upIsDoubtful && !navigation.chosen_up)
+      notice.show(text.quality.up_doubtful, 20, {
+        label: text.quality.flip,
+        take: () => navigation.turn_over(),
+      });
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;

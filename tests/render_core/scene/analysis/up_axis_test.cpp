@@ -91,6 +91,21 @@ TEST(UpAxis, AHalfTurnOfTheSceneTurnsUpOver) {
     }
 }
 
+// Where files of a kind have y up or down alike, faint light from above decides.
+TEST(UpAxis, FaintEvidenceDecidesWhereYMayBeUpOrDown) {
+  GaussianCloud cloud = ball(1.0f);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const auto noise = static_cast<float>(std::fmod(0.618034 * static_cast<double>(i), 1.0));
+    cloud.sh[i * cloud.sh_count()] = glm::vec3(2.0f * noise - 1.0f - 0.2f * cloud.mean[i].y);
+  }
+  for (const glm::quat& by : {as_it_is, half_about_x}) {
+    GaussianCloud turned = cloud;
+    turn(turned, by);
+    EXPECT_EQ(find_up(turned, {}), minus_y);
+    EXPECT_LT(degrees_between(find_up(turned, {}, 1.0f, UsualUp::either_y), by * minus_y), 0.5f);
+  }
+}
+
 /// Every `stride`-th Gaussian, in the order along an axis; 3: in that of the cloud.
 GaussianCloud part_of(const GaussianCloud& cloud, int axis, std::size_t stride) {
   std::vector<std::size_t> order(cloud.size());
@@ -163,6 +178,7 @@ TEST(UpAxis, AxesHaveNames) {
 TEST(UpAxis, AThingWithoutAFloorHasTheUsualUp) {
   EXPECT_EQ(find_up(ball(1.0f), {}), minus_y);
   EXPECT_EQ(find_up(GaussianCloud{}, {}), minus_y);
+  EXPECT_EQ(find_up(ball(1.0f), {}, 1.0f, UsualUp::plus_z), plus_z);
 }
 
 }  // namespace

@@ -101,17 +101,36 @@ TEST(Sidecar, ErrorsNameTheField) {
 class Hints : public FolderTest {
  protected:
   SceneHints find() {
-    return find_hints(
-        [&] { return view_sample(cloud_); },
-        {folder_ / "s.json", folder_ / "cameras.json", folder_ / "transforms.json", orbit_}, up_,
-        notes_, pool_);
+    return find_hints([&] { return view_sample(cloud_); },
+                      {.sidecar = folder_ / "s.json",
+                       .cameras = folder_ / "cameras.json",
+                       .transforms = folder_ / "transforms.json",
+                       .orbit = orbit_,
+                       .usual_up = usual_up_},
+                      up_, notes_, pool_);
   }
+  UsualUp usual_up_ = UsualUp::minus_y;
   std::optional<OrbitLimits> orbit_;
   std::shared_ptr<ThreadPool> pool_ = std::make_shared<ThreadPool>(2);
   std::optional<glm::vec3> up_;
   GaussianCloud cloud_ = ball(1.0f);
   std::vector<std::string> notes_;
 };
+
+TEST_F(Hints, UpIsDoubtfulUntilSomebodySaysIt) {
+  EXPECT_FALSE(find().up_is_doubtful);
+  usual_up_ = UsualUp::either_y;
+  EXPECT_TRUE(find().up_is_doubtful);
+  for (const auto& [sidecar, doubtful] :
+       {std::pair{R"({"near": 0.1})", true}, std::pair{R"({"up": "+y"})", false},
+        std::pair{R"({"start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]}})", false}}) {
+    write("s.json", sidecar);
+    EXPECT_EQ(find().up_is_doubtful, doubtful) << sidecar;
+  }
+  write("s.json", "{}");
+  up_ = down_y;
+  EXPECT_FALSE(find().up_is_doubtful);
+}
 
 // With y down, heights above the focus are below it in y.
 TEST_F(Hints, AnOrbitNarrowsTheLimits) {

@@ -7,12 +7,14 @@
 
 #include "render_core/scene/files/locate_scene.h"
 #include "render_core/scene/files/save_scene.h"
+#include "render_core/scene/files/scene_parts.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/ply.h"
 #include "render_core/scene/prune.h"
 #include "render_core/scene/scene.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/scene_test_support.h"
+#include "tests/support/surface_clouds.h"
 
 namespace catgs::test {
 namespace {
@@ -50,6 +52,16 @@ TEST_F(LoadScene, AFirstViewThatNobodyWantsIsLeftOutUnlessAFileTellsIt) {
   EXPECT_EQ(load_scene(folder_ / "room.ply", options).hints.source, "");
   write("room.json", R"({"near": 0.125})");
   EXPECT_EQ(load_scene(folder_ / "room.ply", options).hints.near_z, 0.125f);
+}
+
+TEST_F(LoadScene, NerfstudiosCommentMakesZTheUsualUp) {
+  std::string bytes = ply_bytes(ball(1.0f));
+  bytes.insert(bytes.find("element vertex"), "comment Vertical Axis: z\n");
+  write("ball.ply", bytes);
+  EXPECT_EQ(load_scene(folder_ / "ball.ply").hints.up, glm::vec3(0, 0, 1));
+  const auto pool = std::make_shared<ThreadPool>(2);
+  EXPECT_EQ(scene_in_parts(locate_scene(folder_ / "ball.ply"), {}, pool)->hints.up,
+            glm::vec3(0, 0, 1));
 }
 
 TEST_F(LoadScene, TheModelIsThatOfTheOptionElseTheSidecarElseTheFile) {

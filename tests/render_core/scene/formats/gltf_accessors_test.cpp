@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "render_core/scene/activations.h"
 #include "tests/render_core/scene/formats/encoders.h"
 #include "tests/render_core/scene/formats/gltf_test_support.h"
 
@@ -74,6 +75,38 @@ TEST(Gltf, AccessorsWithoutABufferViewAreZeros) {
     EXPECT_EQ(read.sh_of(i)[0], cloud.sh_of(i)[0]);
     for (int k = 1; k < 4; ++k) EXPECT_EQ(read.sh_of(i)[k], glm::vec3(0.0f));
   }
+}
+
+TEST(Gltf, DraftsWithOtherNamesAreRead) {
+  const GaussianCloud cloud = random_cloud(300, 1);
+  GltfParts parts = encode_gltf(cloud);
+  std::vector<float> colours;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    for (int c = 0; c < 3; ++c) colours.push_back(colour_from_sh(cloud.sh_of(i)[0][c]));
+    colours.push_back(cloud.opacity[i]);
+  }
+  const std::size_t view = add_view(
+      parts, {reinterpret_cast<const char*>(colours.data()), colours.size() * sizeof(float)});
+  Json& accessors = parts.json["accessors"];
+  accessors.push_back(
+      {{"bufferView", view}, {"componentType", 5126}, {"count", cloud.size()}, {"type", "VEC4"}});
+  Json& primitive = primitive_of(parts.json);
+  Json attributes = {{"COLOR_0", accessors.size() - 1}};
+  for (const auto& [name, accessor] : primitive["attributes"].items()) {
+    const std::string own = name.substr(name.find(':') + 1);
+    if (own == name)
+      attributes[name] = accessor;
+    else if (own != "OPACITY" && own != "SH_DEGREE_0_COEF_0")
+      attributes["_" + own] = accessor;
+  }
+  primitive["attributes"] = attributes;
+  Json& extension = primitive["extensions"]["KHR_gaussian_splatting"] = Json::object();
+  const GltfFile read = parse_gltf(parts.glb());
+  expect_near(cloud, read.cloud, {.rotation_rad = 1e-6f, .opacity = 1e-6f, .sh0 = 1e-6f});
+  EXPECT_EQ(read.notes.size(), 1u);
+  extension["quantizedPositionScale"] = 13.5;
+  EXPECT_THAT(refusal_of([&] { parse_gltf(parts.glb()); }).where,
+              ::testing::HasSubstr("quantizedPositionScale"));
 }
 
 TEST(Gltf, SparseAccessorsThatCannotBeAreRefused) {

@@ -311,9 +311,11 @@ TEST(Gltf, UnknownWordsAreTold) {
   GltfParts parts = encode_gltf(random_cloud(30, 0));
   Json& extension = primitive_of(parts.json)["extensions"]["KHR_gaussian_splatting"];
   extension = {{"kernel", "cube"}, {"colorSpace", "p3"}, {"projection", "fisheye"}};
-  EXPECT_THAT(parse_gltf(parts.glb()).notes,
-              ::testing::UnorderedElementsAre(HasSubstr("kernel 'cube'"), HasSubstr("'fisheye'"),
-                                              HasSubstr("colorSpace 'p3'")));
+  parts.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = Json::object();
+  EXPECT_THAT(
+      parse_gltf(parts.glb()).notes,
+      ::testing::UnorderedElementsAre(HasSubstr("kernel 'cube'"), HasSubstr("'fisheye'"),
+                                      HasSubstr("colorSpace 'p3'"), HasSubstr("instances")));
 }
 
 }  // namespace

@@ -219,6 +219,15 @@ TEST(Ply, AnyOrderTypesAndExtraPropertiesAreRead) {
     expect_same_up_to_activations(cloud, parse(encode(columns, encoding)));
 }
 
+TEST(Ply, PlusSignsInTextAreRead) {
+  const GaussianCloud cloud = random_cloud(50, 0);
+  std::string bytes = encode(columns_of(cloud), "ascii");
+  for (std::size_t at = bytes.find("end_header\n") + 11; at < bytes.size(); ++at)
+    if (std::isdigit(bytes[at]) && (bytes[at - 1] == ' ' || bytes[at - 1] == '\n'))
+      bytes.insert(at++, "+");
+  expect_same_up_to_activations(cloud, parse(bytes));
+}
+
 TEST(Ply, IntegerPropertiesAreConverted) {
   std::vector<Column> columns = columns_of(random_cloud(2, 0));
   for (Column& c : columns)

@@ -173,6 +173,8 @@ TEST(Spz, TheAxesExtensionIsObeyed) {
   for (const int version : {3, 4}) {
     SpzStyle style{.version = version, .coordinate_system = 6};  // right, down, front
     expect_near(cloud, parse(encode_spz(cloud, style)).cloud, byte_steps);
+    EXPECT_TRUE(parse(encode_spz(cloud, style)).names_axes);
+    EXPECT_FALSE(parse(encode_spz(cloud, {.version = version})).names_axes);
     style.coordinate_system = 5;  // left, down, front: x turned around
     const GaussianCloud turned = parse(encode_spz(cloud, style)).cloud;
     EXPECT_NEAR(turned.mean[0].x, -cloud.mean[0].x, 0.001f);

@@ -30,6 +30,11 @@ class Convert : public CatgsRender {
   Outcome convert(const std::string& out, const std::string& options) const {
     return run(fmt::format("convert {} {} {}", scene(), path(out), options));
   }
+  void add_title(const std::string& sidecar) const {
+    auto json = nlohmann::json::parse(std::ifstream(path(sidecar)));
+    json["title"] = "Edited";
+    std::ofstream(path(sidecar)) << json;
+  }
   nlohmann::json info(const std::string& name) const {
     return nlohmann::json::parse(run("info --json " + path(name)).out);
   }
@@ -213,18 +218,57 @@ TEST_F(Convert, OutputsBeginWhereTheirInputDoes) {
   const Outcome compared = run(fmt::format("compare --json {} {}", path("a"), path("b")));
   EXPECT_TRUE(nlohmann::json::parse(compared.out).at("cameras_differ").is_null()) << compared.out;
 
+  // Estimates of each scene by itself differ, and scripts can tell.
+  std::filesystem::remove(path("few.json"));
+  ASSERT_EQ(run(fmt::format("frames {} --script orbit --size 64x48 --fps 2 --duration 1 "
+                            "--renderer cpu --out {}",
+                            path("few.spz"), path("c")))
+                .exit_code,
+            0);
+  for (const auto& [folder, differ] : {std::pair{"b", false}, std::pair{"c", true}}) {
+    const std::string pair = fmt::format("{} {}", path("a"), path(folder));
+    EXPECT_EQ(run("compare " + pair).exit_code, 0);
+    EXPECT_EQ(run("compare --require-same-cameras " + pair).exit_code, differ ? 1 : 0);
+    EXPECT_EQ(run("compare " + pair).out.find("pictures were drawn by other") != std::string::npos,
+              differ);
+  }
+
   std::ofstream(path("own.json")) << R"({"near": 0.5})";
   EXPECT_THAT(convert("own.ply", "").out, HasSubstr("own.json exists and was left as it is"));
   EXPECT_EQ(std::filesystem::file_size(path("own.json")), 13u);
-  // The same command a second time finds the sidecar that it has written.
-  for (int time = 0; time < 2; ++time)
-    EXPECT_EQ(convert("twice.ply", "--rotate=0,30,0 --scale 3").exit_code, 0);
-  EXPECT_EQ(convert("twice.ply", "--rotate=0,31,0 --scale 3").exit_code, 2);
+  // Another command replaces the sidecar of the one before, but not one that an author changed.
+  for (const char* turn : {"30", "30", "31"})
+    EXPECT_EQ(convert("twice.ply", fmt::format("--rotate=0,{},0 --scale 3", turn)).exit_code, 0);
+  add_title("twice.json");
+  EXPECT_EQ(convert("twice.ply", "--rotate=0,32,0 --scale 3").exit_code, 2);
   // A moved view is not that of the input, which has the same sidecar.
   const Outcome moved = convert("ball.spz", "--scale 2");
   EXPECT_EQ(moved.exit_code, 0) << moved.out;
   EXPECT_THAT(moved.out, HasSubstr("ball.json was not written"));
   EXPECT_EQ(hints_of("ball.ply"), hints);
+}
+
+TEST_F(Convert, AnotherSceneReplacesTheViewThatConvertWrote) {
+  GaussianCloud other = ball();
+  for (glm::vec3& mean : other.mean) mean += 7.0f;
+  save_scene(other, path("other.ply"));
+  const auto text_of = [&](const char* name) {
+    std::ifstream file(path(name));
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string from_other = fmt::format("convert {} ", path("other.ply"));
+  ASSERT_EQ(run(from_other + path("fresh.ply")).exit_code, 0);
+  ASSERT_EQ(convert("out.ply", "").exit_code, 0);
+  ASSERT_NE(text_of("out.json"), text_of("fresh.json"));
+  const Outcome replaced = run(from_other + path("out.ply"));
+  EXPECT_EQ(text_of("out.json"), text_of("fresh.json")) << replaced.out;
+  add_title("out.json");
+  const std::string edited = text_of("out.json");
+  const Outcome kept = convert("out.ply", "");
+  EXPECT_EQ(kept.exit_code, 0);
+  EXPECT_THAT(kept.out, HasSubstr("may be of another scene"));
+  EXPECT_EQ(text_of("out.json"), edited);
+  EXPECT_THAT(run(from_other + path("out.ply")).out, Not(HasSubstr("another scene")));
 }
 
 TEST_F(Convert, ALoneGaussianKeepsItsView) {
@@ -303,6 +347,9 @@ TEST_F(Convert, LossesOfTheOutputAreTold) {
               HasSubstr("note: 400 of 400 Gaussians are smaller than 4.4e-05"));
   EXPECT_THAT(convert("whole.ply", small).out, Not(HasSubstr("note:")));
   EXPECT_THAT(run("info " + path("small.spz")).out, HasSubstr("does not name its axes"));
+  EXPECT_FALSE(load_scene(path("small.spz")).hints.up_is_doubtful) << "the sidecar tells";
+  std::filesystem::remove(path("small.json"));
+  EXPECT_TRUE(load_scene(path("small.spz")).hints.up_is_doubtful);
 }
 
 }  // namespace

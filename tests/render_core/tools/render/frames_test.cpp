@@ -212,6 +212,8 @@ TEST_F(Frames, TheLensOfThePathIsDrawnAtAnySize) {
   constexpr const char* fisheye =
       R"({{"camera_model": "OPENCV_FISHEYE", "k1": 0.25, "w": 64, "h": 48, "fl_x": 50,
            "frames": [{{"transform_matrix": {}}}]}})";
+  constexpr const char* no_size =
+      R"({{"fl_x": 50, "cx": 32, "cy": 24, "frames": [{{"transform_matrix": {}}}]}})";
   constexpr const char* viewer = R"({{"camera_path": [{{"camera_to_world": {}, "fov": 90}}]}})";
   constexpr const char* training =
       R"([{"img_name": "a", "width": 64, "height": 48, "fx": 50, "fy": 50, "position": [0, 0, 0],
@@ -219,6 +221,8 @@ TEST_F(Frames, TheLensOfThePathIsDrawnAtAnySize) {
   for (const auto& [file, text, flags, size, focal_px, note] : std::vector<Case>{
            {"transforms_test.json", blender, "--size 60x60", "60x60", "30"},
            {"transforms_test.json", blender, "", "1280x720", "640", "tells no size; 1280x720"},
+           {"transforms.json", no_size, "", "64x48", "50"},
+           {"transforms.json", no_size, "--size 128x96", "128x96", "100"},
            {"camera_path.json", viewer, "--size 80x48", "80x48", "24"},
            {"transforms.json", fisheye, "", "64x48", "50", "without its OPENCV_FISHEYE k1 0.25"},
            {"transforms.json", fisheye, "--fov-deg 90", "64x48", "24"},
