@@ -121,7 +121,7 @@ describe('a walker', () => {
   });
 
   it('comes to stand where the one of render_core does', () => {
-    for (const { position, stand: below, eyes } of golden.below) {
+    for (const { place: position, stand: below, eyes } of golden.below) {
       const found = stand_below(map, [position[0]!, position[1]!, position[2]!])!;
       expect_vec([found.east, found.north, found.height], [below[0]!, below[1]!, below[2]!], 3);
       expect_vec(eyes_of(map, found), [eyes[0]!, eyes[1]!, eyes[2]!], 4);
