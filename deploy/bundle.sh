@@ -4,15 +4,14 @@
 #
 #   deploy/bundle.sh [--build DIR] [--out FILE.tar.xz]
 #
-# DIR is a finished build (default: build/run, else build/release, else build/cuda); run.sh builds no
-# benchmarks, so a bundle for measurements needs another one. FILE is
+# DIR is a finished build (default: build/run, else build/release, else build/cuda). FILE is
 # build/catgs-bundle.tar.xz by default. The archive holds:
 #
 #   bin/               the programs: start them here
 #   lib/               their libraries, most of which come with libavcodec: it is linked against
 #                      every codec of the distribution
 #   share/catgs/web    the web client, if it was built
-#   share/catgs/load   scenarios of catgs-load, to size a deployment, if catgs-load was built
+#   share/catgs/load   scenarios of catgs-load, to size a deployment, if run.sh --with-load built it
 #   share/doc          licences of all that is in it: read NOTICES.md there before you pass the
 #                      archive on
 #

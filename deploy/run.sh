@@ -17,6 +17,7 @@ streamed SOG, 3D Tiles, or a training output.
   --lan        also serve other devices in this network: all interfaces, a token, TLS with a
                self-signed certificate, and a QR code of the link for your phone
   --no-cuda    build for the CPU even if there are a GPU and nvcc
+  --with-load  also build catgs-load, which measures how many visitors a machine can serve
   --log FILE   the build's full log (default build/run/run.log)
   -h, --help   this text
 
@@ -36,6 +37,7 @@ server_options=()
 port=8080
 lan=0
 allow_cuda=1
+with_load=OFF
 log=$build_dir/run.log
 readonly demo_dir=$build_dir/scenes
 readonly demo_scenes=("$demo_dir/city.ply" "$demo_dir/garden.ply")
@@ -52,6 +54,7 @@ parse_arguments() {
       --log=*) log=${1#*=} ;;
       --lan) lan=1 ;;
       --no-cuda) allow_cuda=0 ;;
+      --with-load) with_load=ON ;;
       -h | --help)
         usage
         exit 0
@@ -330,11 +333,11 @@ main() {
   steps_begin $((6 + lan + (${#scenes[@]} == 0))) "$log"
   step "System: $distribution, $(nproc) cores, $cuda_note" check_system
   ensure_packages "${build_packages[@]}"
-  local -a cuda_options=("-DCATGS_CUDA=$cuda_choice")
+  local -a build_options=("-DCATGS_CUDA=$cuda_choice" "-DCATGS_LOAD=$with_load")
   if [[ $cuda_choice == ON ]]; then
-    cuda_options+=("-DCMAKE_CUDA_COMPILER=$nvcc_path" -DCMAKE_CUDA_ARCHITECTURES=native)
+    build_options+=("-DCMAKE_CUDA_COMPILER=$nvcc_path" -DCMAKE_CUDA_ARCHITECTURES=native)
   fi
-  configure_build run "${cuda_options[@]}"
+  configure_build run "${build_options[@]}"
   build_all run "Build server, tools and client"
   compose_server_command
   check_server_options

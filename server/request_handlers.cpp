@@ -29,7 +29,8 @@ RequestHandlers::RequestHandlers(Parts around)
     visits.emplace(*parts.statistics, unix_now_s, [this](const std::string& scene_id) {
       const auto listing = parts.scenes.listing();
       const auto scene = std::ranges::find(*listing, scene_id, &SceneLibrary::Listing::id);
-      return scene != listing->end() && scene->tours ? scene->tours->titles : nullptr;
+      if (scene == listing->end()) return VisitsPage::Titles();
+      return VisitsPage::Titles{scene->title, scene->tours ? scene->tours->titles : nullptr};
     });
   if (!parts.config.token_key_file.empty()) remove_stale_files();  // others save nothing
 }

@@ -7,6 +7,7 @@
 #include "render_core/base/device_set.h"
 #include "server/media/media_type.h"
 #include "server/request_handlers.h"
+#include "server/scenes/scene_requests.h"
 #include "server/scenes/tours.h"
 
 namespace catgs {
@@ -119,6 +120,36 @@ std::future<HttpResponse> take_cancel(RequestHandlers& handlers, const RouteRequ
   return answer.get_future();
 }
 
+/// The page asks for its document at its own address with ".json" added.
+HttpResponse charts_page(RequestHandlers& handlers, const RouteRequest& request) {
+  if (!handlers.visits)
+    return text_response(404, "404: visits are not counted here: see --visit-counts\n");
+  HttpRequest of_file = request.http;
+  of_file.path = "/charts.html";
+  HttpResponse page = handlers.parts.client.respond(of_file);
+  if (page.status == 404)
+    return text_response(404, "404: this page was not built; /visits.json has the counts\n");
+  // Script and style are inside the page.
+  page.policy =
+      "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+      "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'";
+  return page;
+}
+
+/// The counts of the scenes that the sender may save.
+HttpResponse own_visit_charts(RequestHandlers& handlers, const RouteRequest& request) {
+  if (!handlers.visits) return charts_page(handlers, request);
+  const Permit permit = permit_of(handlers.parts.authorize, request.http);
+  const auto shows = [permit](const std::string& scene_id) {
+    return permit.allows(scene_id, Use::save);
+  };
+  const auto ids = handlers.parts.scenes.listing();
+  if (std::ranges::none_of(*ids, shows, &SceneLibrary::Listing::id))
+    return unauthorized(permit.refusal(ids->empty() ? "" : ids->front().id, Use::save)
+                            .value_or("there is no scene"));
+  return handlers.visits->charts(request.http, shows);
+}
+
 // The admin port.
 
 HttpResponse not_here(RequestHandlers&, const RouteRequest&) {
@@ -145,21 +176,6 @@ HttpResponse metrics_json(RequestHandlers& handlers, const RouteRequest&) {
 
 HttpResponse session_list(RequestHandlers& handlers, const RouteRequest&) {
   return text_response(200, handlers.parts.sessions.published_json(), "application/json");
-}
-
-/// The page asks for its document at its own address with ".json" added.
-HttpResponse charts_page(RequestHandlers& handlers, const RouteRequest& request) {
-  if (!handlers.visits) return not_here(handlers, request);
-  HttpRequest of_file = request.http;
-  of_file.path = "/charts.html";
-  HttpResponse page = handlers.parts.client.respond(of_file);
-  if (page.status == 404)
-    return text_response(404, "404: this page was not built; /visits.json has the counts\n");
-  // Script and style are inside the page.
-  page.policy =
-      "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-      "connect-src 'self'; base-uri 'none'; frame-ancestors 'none'";
-  return page;
 }
 
 HttpResponse visit_charts(RequestHandlers& handlers, const RouteRequest& request) {
@@ -197,6 +213,8 @@ constexpr auto public_table = std::to_array<Route>({
     {get, "/api/films/{job}/file", no_body, none, film_result},
     {delete_, "/api/films/{job}", no_body, none, cancel_film},
     {put, "/api/films/{job}/cancel", max_sent_sidecar_bytes, none, {take_cancel, refuse_cancel}},
+    {get, "/visits", no_body, none, charts_page},
+    {get, "/visits.json", no_body, none, own_visit_charts},
     {get, "/", no_body, none, front_page},
     {get, "/index.html", no_body, none, front_page},
     {get, "{path...}", no_body, none, client_file},

@@ -41,11 +41,9 @@ std::string counts_json(const DayCounts& day) {
     auto stops = nlohmann::json::array();
     for (const auto& [stop, count] : counts.stops)
       stops.push_back({{"tour", stop.tour}, {"stop", stop.stop}, {"visits", count}});
-    scenes[id] = {{"visits", counts.visits},
-                  {"seconds", counts.seconds},
-                  {"bytes", counts.bytes},
-                  {"devices", std::move(devices)},
-                  {"stops", std::move(stops)}};
+    scenes[id] = {{"visits", counts.visits},   {"seconds", counts.seconds},
+                  {"bytes", counts.bytes},     {"devices", std::move(devices)},
+                  {"stops", std::move(stops)}, {"links", counts.links}};
   }
   return nlohmann::json{{"scenes", std::move(scenes)}}.dump(
       1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -74,6 +72,10 @@ DayCounts read_counts(const ByteSource& file) {
                         static_cast<std::uint32_t>(stops[i].at("stop").count())};
       counts.stops[stop] = stops[i].at("visits").count();
     }
+    if (const auto links = scene.find("links"); links && links->value().is_object())
+      for (const auto& [link, visits] : links->value().items())
+        if (counts.links.size() < VisitCounts::most_stops)
+          counts.links[link] = links->at(link).count();
     if (day.size() > VisitCounts::most_scenes + 1) scenes.fail("has too many scenes");
   }
   return day;

@@ -8,13 +8,14 @@
 namespace catgs {
 namespace {
 
-std::size_t stops_of(const DayCounts& day) {
-  std::size_t stops = 0;
-  for (const auto& [id, counts] : day) stops += counts.stops.size();
-  return stops;
+/// Stops and links.
+std::size_t details_of(const DayCounts& day) {
+  std::size_t details = 0;
+  for (const auto& [id, counts] : day) details += counts.stops.size() + counts.links.size();
+  return details;
 }
 
-std::size_t entries_of(const DayCounts& day) { return day.size() + stops_of(day); }
+std::size_t entries_of(const DayCounts& day) { return day.size() + details_of(day); }
 
 SceneCounts& scene_of(const std::string& id, DayCounts& day) {
   const std::string others(VisitCounts::other_scenes);
@@ -22,12 +23,14 @@ SceneCounts& scene_of(const std::string& id, DayCounts& day) {
   return told_apart < VisitCounts::most_scenes || day.contains(id) ? day[id] : day[others];
 }
 
-/// `stops`: of the whole day.
-void add_stop(StopId stop, std::uint64_t visits, SceneCounts& to, std::size_t& stops) {
-  if (stops >= VisitCounts::most_stops && !to.stops.contains(stop)) return;
-  const auto [counted, is_new] = to.stops.try_emplace(stop, 0);
+/// `details`: of the whole day.
+template <typename Id>
+void add_detail(const Id& id, std::uint64_t visits, std::map<Id, std::uint64_t>& to,
+                std::size_t& details) {
+  if (details >= VisitCounts::most_stops && !to.contains(id)) return;
+  const auto [counted, is_new] = to.try_emplace(id, 0);
   counted->second += visits;
-  stops += is_new ? 1 : 0;
+  details += is_new ? 1 : 0;
 }
 
 }  // namespace
@@ -47,14 +50,15 @@ bool is_date(std::string_view text) {
 }
 
 void add(const DayCounts& from, DayCounts& to) {
-  std::size_t stops = stops_of(to);
+  std::size_t details = details_of(to);
   for (const auto& [id, counts] : from) {
     SceneCounts& sum = scene_of(id, to);
     sum.visits += counts.visits;
     sum.seconds += counts.seconds;
     sum.bytes += counts.bytes;
     for (std::size_t i = 0; i < device_kinds; ++i) sum.devices[i] += counts.devices[i];
-    for (const auto& [stop, visits] : counts.stops) add_stop(stop, visits, sum, stops);
+    for (const auto& [stop, visits] : counts.stops) add_detail(stop, visits, sum.stops, details);
+    for (const auto& [link, visits] : counts.links) add_detail(link, visits, sum.links, details);
   }
 }
 
@@ -78,11 +82,18 @@ SceneCounts& VisitCounts::counts_of(const std::string& scene_id, DayCounts& day)
   return counts;
 }
 
-void VisitCounts::visit(const std::string& scene_id, DeviceKind device) {
+void VisitCounts::visit(const std::string& scene_id, DeviceKind device,
+                        const std::string& link_id) {
   const std::lock_guard lock(mutex_);
-  SceneCounts& counts = counts_of(scene_id, today());
+  DayCounts& day = today();  // one look at the clock, which may pass midnight
+  SceneCounts& counts = counts_of(scene_id, day);
   ++counts.visits;
   ++counts.devices[static_cast<std::size_t>(device)];
+  if (link_id.empty()) return;
+  const std::size_t before = details_of(day);
+  std::size_t details = before;
+  add_detail(link_id, 1, counts.links, details);
+  entries_ += details - before;
 }
 
 void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64_t bytes) {
@@ -94,11 +105,11 @@ void VisitCounts::spend(const std::string& scene_id, double seconds, std::uint64
 
 void VisitCounts::reach(const std::string& scene_id, StopId stop) {
   const std::lock_guard lock(mutex_);
-  DayCounts& day = today();  // one look at the clock, which may pass midnight
-  const std::size_t before = stops_of(day);
-  std::size_t stops = before;
-  add_stop(stop, 1, counts_of(scene_id, day), stops);
-  entries_ += stops - before;
+  DayCounts& day = today();
+  const std::size_t before = details_of(day);
+  std::size_t details = before;
+  add_detail(stop, 1, counts_of(scene_id, day).stops, details);
+  entries_ += details - before;
 }
 
 std::vector<std::string> VisitCounts::dates() const {

@@ -29,6 +29,7 @@ struct SceneCounts {
   std::uint64_t bytes = 0;  // of pictures
   std::array<std::uint64_t, device_kinds> devices{};  // visits, by DeviceKind
   std::map<StopId, std::uint64_t> stops{};            // visits that reached the stop
+  std::map<std::string, std::uint64_t> links{};       // visits, by the id of their link
 };
 
 using DayCounts = std::map<std::string, SceneCounts>;  // by the scene's id
@@ -39,16 +40,17 @@ class VisitCounts {
   static constexpr std::size_t most_days = 400;
   /// On one day. Further scenes are counted together, as `other_scenes`.
   static constexpr std::size_t most_scenes = 1000;
-  /// On one day, in all scenes. Further stops are not counted.
+  /// Stops and links on one day, in all scenes. Further ones are not counted.
   static constexpr std::size_t most_stops = 20'000;
-  /// Scenes and stops of all days. Beyond it the oldest day goes.
+  /// Scenes, stops and links of all days. Beyond it the oldest day goes.
   static constexpr std::size_t most_entries = 400'000;
   static constexpr std::string_view other_scenes = "(others)";
 
   /// `unix_s`: the time, which decides about the day.
   explicit VisitCounts(std::function<std::int64_t()> unix_s) : unix_s_(std::move(unix_s)) {}
 
-  void visit(const std::string& scene_id, DeviceKind device);
+  /// `link_id`: empty: the visitor came by no link.
+  void visit(const std::string& scene_id, DeviceKind device, const std::string& link_id = {});
   void spend(const std::string& scene_id, double seconds, std::uint64_t bytes);
   void reach(const std::string& scene_id, StopId stop);
 

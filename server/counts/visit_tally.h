@@ -18,15 +18,17 @@ class VisitTally {
   explicit VisitTally(VisitCounts* counts) : counts_(counts) {}
 
   /// Call it often while the visitor sees the scene. `bytes_sent`: in the whole visit so far.
+  /// `link_id`: by which the visitor came; empty: by none.
   void on_show(const std::string& scene_id, DeviceKind device, std::uint64_t bytes_sent,
-               TimePoint now);
+               TimePoint now, const std::string& link_id = {});
   /// The visitor sees nothing for a while.
   void off_show() { seen_at_.reset(); }
   /// A stop of the scene counts once in a visit, however often it is reached.
-  void reached(const std::string& scene_id, DeviceKind device, StopId stop);
+  void reached(const std::string& scene_id, DeviceKind device, StopId stop,
+               const std::string& link_id = {});
 
  private:
-  void enter(const std::string& scene_id, DeviceKind device);
+  void enter(const std::string& scene_id, DeviceKind device, const std::string& link_id);
 
   VisitCounts* const counts_;
   std::string scene_id_;

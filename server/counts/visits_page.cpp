@@ -81,8 +81,8 @@ std::pair<std::string, std::string> stop_titles(const VisitsPage::Titles& titles
                                                 const StopId& id) {
   std::pair<std::string, std::string> of{fmt::format("tour {}", id.tour + 1),
                                          fmt::format("stop {}", id.stop + 1)};
-  if (!titles || id.tour >= titles->size()) return of;
-  const TourTitles& tour = (*titles)[id.tour];
+  if (!titles.tours || id.tour >= titles.tours->size()) return of;
+  const TourTitles& tour = (*titles.tours)[id.tour];
   if (!tour.tour.empty()) of.first = tour.tour;
   if (id.stop < tour.stops.size() && !tour.stops[id.stop].empty()) of.second = tour.stops[id.stop];
   return of;
@@ -144,7 +144,7 @@ std::string stops_rows(const std::string& date, const DayCounts& day,
                        const VisitsPage::TitlesOf& titles_of) {
   std::string out;
   for (const auto& [id, counts] : day) {
-    const auto titles = counts.stops.empty() ? nullptr : titles_of(id);
+    const auto titles = counts.stops.empty() ? VisitsPage::Titles() : titles_of(id);
     for (const auto& [stop, visits] : counts.stops) {
       const auto [tour, title] = stop_titles(titles, stop);
       out += fmt::format("{},{},{},{},{},{},{}\r\n", date, csv_text(id), stop.tour + 1,
@@ -157,15 +157,21 @@ std::string stops_rows(const std::string& date, const DayCounts& day,
 /// The counts of some days, of all scenes or of one.
 struct Summary {
   std::string only;  // a scene's id; empty: all
+  VisitsPage::Shows shows{};
   DayCounts scenes{};
   SceneCounts sum{};  // without stops
   std::vector<std::pair<std::string, double>> visits{}, hours{};
 
   void take(const std::string& date, DayCounts day) {
     SceneCounts of_day;
+    if (shows) std::erase_if(day, [&](const auto& scene) { return !shows(scene.first); });
     for (auto& [id, counts] : day) {
       if (id != only) counts.stops.clear();
+      const auto links = std::exchange(counts.links, {});
       if (!only.empty() && id != only) continue;
+      for (const auto& [link, count] : links)
+        if (sum.links.size() < VisitCounts::most_stops || sum.links.contains(link))
+          sum.links[link] += count;
       of_day.visits += counts.visits;
       of_day.seconds += counts.seconds;
     }
@@ -177,27 +183,56 @@ struct Summary {
   }
 };
 
-/// For charts.html of the web client.
+Json table(std::string_view heading, Json columns, Json rows) {
+  return {{"heading", heading},
+          {"table", {{"columns", std::move(columns)}, {"rows", std::move(rows)}}}};
+}
+
+/// Most visits first.
+Json link_rows(const SceneCounts& sum) {
+  std::vector<std::pair<std::string, std::uint64_t>> links(sum.links.begin(), sum.links.end());
+  std::ranges::stable_sort(links, std::ranges::greater(), [](const auto& of) { return of.second; });
+  std::uint64_t others = sum.visits;
+  Json rows = Json::array();
+  for (const auto& [id, visits] : links) {
+    rows.push_back({id, visits});
+    others -= std::min(others, visits);
+  }
+  rows.push_back({"none, or not counted by link", others});
+  return rows;
+}
+
+/// For charts.html of the web client. Addresses are relative to that of the page.
 std::string json_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
   const std::size_t days = all.visits.size();
+  const auto called = [&](const std::string& id) {
+    const std::string title = titles_of(id).scene;
+    return title.empty() ? std::string(name_in(id)) : title;
+  };
+  const std::string chosen = all.only.empty() ? "" : "&scene=" + percent_encoded(all.only);
+  const std::string every = all.shows ? "your scenes" : "all scenes";
+  const std::string whose = all.only.empty() ? every : called(all.only);
   Json links = Json::array(), rows = Json::array();
   for (const int other : {7, 30, 90, 400})
-    links.push_back(link(fmt::format("{} days", other), fmt::format("/visits?days={}", other)));
-  links.push_back(link("CSV", "/visits.csv"));
-  links.push_back(link("CSV of stops", "/visits/stops.csv"));
+    links.push_back(
+        link(fmt::format("{} days", other), fmt::format("visits?days={}{}", other, chosen)));
+  if (!all.only.empty()) links.push_back(link("All scenes", fmt::format("visits?days={}", days)));
+  if (!all.shows) {
+    links.push_back(link("CSV", "visits.csv"));
+    links.push_back(link("CSV of stops", "visits/stops.csv"));
+  }
   for (const auto& [id, counts] : all.scenes)
     rows.push_back(scene_row(
-        link(name_in(id), fmt::format("/visits?days={}&scene={}", days, percent_encoded(id))),
+        link(called(id), fmt::format("visits?days={}&scene={}", days, percent_encoded(id))),
         counts));
   Json parts = Json::array();
   parts.push_back({{"heading", "By day"},
                    {"plots", Json::array({plot("Visits", all.visits), plot("Hours", all.hours)})}});
-  parts.push_back({{"heading", "Scenes"},
-                   {"table",
-                    {{"columns",
-                      {"Scene", "Visits", "Hours", "Minutes a visit", "MB an hour", "Desktop",
-                       "Phone", "Tablet", "Headset", "Unknown"}},
-                     {"rows", std::move(rows)}}}});
+  parts.push_back(table("Scenes",
+                        {"Scene", "Visits", "Hours", "Minutes a visit", "MB an hour", "Desktop",
+                         "Phone", "Tablet", "Headset", "Unknown"},
+                        std::move(rows)));
+  parts.push_back(table("Links", {"Link", "Visits"}, link_rows(all.sum)));
   if (const auto shown = all.scenes.find(all.only); shown != all.scenes.end()) {
     const VisitsPage::Titles titles = titles_of(all.only);
     Json stops = Json::array();
@@ -205,14 +240,10 @@ std::string json_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
       const auto [tour, title] = stop_titles(titles, stop);
       stops.push_back({tour, title, reached});
     }
-    parts.push_back(
-        {{"heading", "Stops"},
-         {"table",
-          {{"columns", {"Tour", "Stop", "Visits that reached it"}}, {"rows", std::move(stops)}}}});
+    parts.push_back(table("Stops", {"Tour", "Stop", "Visits that reached it"}, std::move(stops)));
   }
   const Json document = {
-      {"title", fmt::format("Visits: {}, {} days",
-                            all.only.empty() ? "all scenes" : name_in(all.only), days)},
+      {"title", fmt::format("Visits: {}, {} days", whose, days)},
       {"facts", fmt::format("{} visits, {:.1f} hours", all.sum.visits, all.sum.seconds / 3600.0)},
       {"links", std::move(links)},
       {"parts", std::move(parts)}};
@@ -220,15 +251,17 @@ std::string json_of(const Summary& all, const VisitsPage::TitlesOf& titles_of) {
 }
 
 DayByDay::Parts summary_parts(const HttpRequest& request, std::int64_t unix_s,
-                              const VisitsPage::TitlesOf& titles_of) {
+                              const VisitsPage::TitlesOf& titles_of, VisitsPage::Shows shows) {
   DayByDay::Parts parts;
   parts.dates = [days = days_of(request), unix_s] {
     std::vector<std::string> dates;
     for (int i = days - 1; i >= 0; --i) dates.push_back(date_of(unix_s - i * seconds_a_day));
     return dates;
   };
-  const auto summary = std::make_shared<Summary>(Summary{argument(request, "scene")});
-  if (!summary->only.empty()) summary->scenes[summary->only];  // however many others there are
+  const auto summary =
+      std::make_shared<Summary>(Summary{argument(request, "scene"), std::move(shows)});
+  if (!summary->only.empty() && (!summary->shows || summary->shows(summary->only)))
+    summary->scenes[summary->only];  // however many others there are
   parts.of_day = [summary](const std::string& date, const DayCounts& day) {
     summary->take(date, day);
     return std::string();
@@ -258,8 +291,9 @@ HttpResponse csv(const UsageStatistics& statistics, std::string head,
 
 }  // namespace
 
-HttpResponse VisitsPage::charts(const HttpRequest& request) const {
-  return day_by_day(statistics_, summary_parts(request, unix_s_(), titles_of_), "application/json");
+HttpResponse VisitsPage::charts(const HttpRequest& request, Shows shows) const {
+  return day_by_day(statistics_, summary_parts(request, unix_s_(), titles_of_, std::move(shows)),
+                    "application/json");
 }
 
 HttpResponse VisitsPage::visits_csv() const {

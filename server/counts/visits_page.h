@@ -13,13 +13,18 @@
 
 namespace catgs {
 
-/// The counts on the admin port. Network thread. Days are read while an answer is sent, one at a
-/// time, on other threads.
+/// The counts, of all scenes or of those whose author asks. Network thread. Days are read while an
+/// answer is sent, one at a time, on other threads.
 class VisitsPage {
  public:
-  using Titles = std::shared_ptr<const std::vector<TourTitles>>;
-  /// Any thread. Of the tours of a scene; null where they are not known.
+  struct Titles {
+    std::string scene{};                                     // empty: it is not known
+    std::shared_ptr<const std::vector<TourTitles>> tours{};  // null: they are not known
+  };
+  /// Any thread.
   using TitlesOf = std::function<Titles(const std::string& scene_id)>;
+  /// Any thread. Whether a scene is shown.
+  using Shows = std::function<bool(const std::string& scene_id)>;
 
   /// All outlive the page and its answers.
   VisitsPage(const UsageStatistics& statistics, std::function<std::int64_t()> unix_s,
@@ -27,7 +32,8 @@ class VisitsPage {
       : statistics_(statistics), unix_s_(std::move(unix_s)), titles_of_(std::move(titles_of)) {}
 
   /// The document that charts.html shows. The query may have `scene`, an id, and `days`.
-  [[nodiscard]] HttpResponse charts(const HttpRequest& request) const;
+  /// `shows`: empty: all scenes are shown, and the files of all.
+  [[nodiscard]] HttpResponse charts(const HttpRequest& request, Shows shows = {}) const;
   [[nodiscard]] HttpResponse visits_csv() const;
   [[nodiscard]] HttpResponse stops_csv() const;
 

@@ -31,8 +31,8 @@ std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t 
   return value;
 }
 
-/// ISO 14496-12: a box "ftyp" whose brand names the kind of file. HEIC and AVIF have the same box.
-/// Its size comes first. A larger one than a list of brands needs could be the text of a page.
+/// ISO 14496-12: a box "ftyp" whose brand names the kind of file. Its size comes first. A larger
+/// one than a list of brands needs could be the text of a page.
 const MediaType* type_of_brand(std::string_view head) {
   constexpr std::uint32_t most_box_bytes = 4096;
   if (head.size() < 16 || head.substr(4, 4) != "ftyp") return nullptr;
@@ -146,6 +146,23 @@ const MediaType* media_type_of(std::string_view head) {
   return is_mp3(head) ? &mp3 : nullptr;
 }
 
+const OtherFormat* other_format(std::string_view name, std::string_view head) {
+  static constexpr std::array others = {
+      OtherFormat{"HEIC", "JPEG", " .heic .heif ", " heic heix heim heis hevc hevx mif1 msf1 "},
+      OtherFormat{"AVIF", "JPEG", " .avif ", " avif avis "},
+      OtherFormat{"QuickTime", "MP4", " .mov ", " qt   "}};
+  const auto has = [](std::string_view words, std::string_view word) {
+    return words.find(fmt::format(" {} ", word)) != std::string_view::npos;
+  };
+  std::string extension(name.substr(std::min(name.rfind('.'), name.size())));
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const bool has_brand = head.size() >= 12 && head.substr(4, 4) == "ftyp";
+  const auto* const found = std::ranges::find_if(others, [&](const OtherFormat& other) {
+    return has(other.extensions, extension) || (has_brand && has(other.brands, head.substr(8, 4)));
+  });
+  return found == others.end() ? nullptr : found;
+}
+
 std::optional<PixelSize> image_size(std::string_view content) {
   const MediaType* type = media_type_of(content);
   if (type == &jpeg) return jpeg_size(content);
@@ -161,6 +178,9 @@ void check_media(std::string_view name, std::string_view content) {
   if (content.size() > max_media_bytes)
     throw InputError(file, {}, fmt::format("is larger than {} MiB", max_media_bytes >> 20),
                      "save it at a lower quality");
+  if (const OtherFormat* other = other_format(name, content))
+    throw InputError(file, {}, fmt::format("is {}, which tours cannot show", other->name),
+                     fmt::format("save it as {}", other->instead));
   const MediaType* named = media_type_named(name);
   const MediaType* type = media_type_of(content.substr(0, media_head_bytes));
   if (!named || !type) throw InputError(file, {}, "is of no format that is shown here", formats);

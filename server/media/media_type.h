@@ -15,6 +15,13 @@ inline constexpr std::size_t media_head_bytes = 4096;
 /// that is valid in two formats is served as the one that is recognised here.
 const MediaType* media_type_of(std::string_view head);
 
+/// A format of cameras that tours do not show.
+struct OtherFormat {
+  std::string_view name, instead, extensions, brands;
+};
+/// Known by a file's extension or its first bytes; null: none of these.
+const OtherFormat* other_format(std::string_view name, std::string_view head);
+
 struct PixelSize {
   std::uint32_t width = 0;
   std::uint32_t height = 0;

@@ -20,6 +20,7 @@ enum class CloseCode : std::uint16_t {
   unsupported_data = 1003,
   policy_violation = 1008,
   too_big = 1009,
+  service_restart = 1012,  // it takes nobody in any more
   try_again_later = 1013,
 };
 

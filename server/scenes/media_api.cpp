@@ -141,6 +141,10 @@ HttpResponse MediaApi::file(const HttpRequest& request, const std::string& scene
 
 std::optional<HttpResponse> MediaApi::refuse_upload(const std::string& scene_id,
                                                     std::string_view name) const {
+  if (const OtherFormat* other = other_format(name, {}))
+    return text_response(400,
+                         fmt::format("400: \"{}\" is {}, which tours cannot show: save it as {}\n",
+                                     printable(name), other->name, other->instead));
   if (!is_media_name(name) || !media_kind_named(name))
     return text_response(
         400, fmt::format("400: \"{}\" is no name of a picture, film or sound: use letters, digits, "

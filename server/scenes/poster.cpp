@@ -36,7 +36,7 @@ std::string render(Renderer& renderer, const SceneFacts& facts) {
 
 }  // namespace
 
-std::shared_ptr<const std::string> make_poster(Renderer& renderer, const SceneFacts& facts) {
+Poster make_poster(Renderer& renderer, const SceneFacts& facts) {
   try {
     return std::make_shared<const std::string>(render(renderer, facts));
   } catch (const std::exception& error) {

@@ -149,7 +149,7 @@ std::shared_ptr<const SceneEntry> load_scene(
     const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress,
-    const KeepView& keep) {
+    const KeepDerived& keep) {
   const std::string spec = location.given.string();
   if (representation.tree.empty())
     log_info({.event = "scene_loading"}, "loading {}", spec);
@@ -160,7 +160,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.threads = threads;
   options.up = axis_named(config.up);
   options.progress = progress;
-  options.keep_view = keep;
+  options.keep_view = keep.view;
   auto [tree, scene] = load(location, representation, config, std::move(options));
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
@@ -184,7 +184,8 @@ std::shared_ptr<const SceneEntry> load_scene(
            : make_renderer(std::make_shared<const GaussianCloud>(std::move(scene.cloud)), core);
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
-  entry->poster = make_poster(*entry->renderer, entry->facts);
+  const auto draw = [&] { return make_poster(*entry->renderer, entry->facts); };
+  entry->poster = keep.poster ? keep.poster(draw) : draw();
   log_info({.event = "scene_loaded", .scene = entry->facts.scene_id},
            "scene {}: {} Gaussians, {}, {}{:.1f} MB per device, view from {}",
            entry->facts.scene_id, entry->facts.gaussians, scene.format,

@@ -12,6 +12,7 @@
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/scene_size.h"
 #include "server/config/config.h"
+#include "server/scenes/poster.h"
 #include "server/scenes/scene_entry.h"
 
 namespace catgs {
@@ -54,14 +55,19 @@ struct LoadedScene {
   bool gave_way = false;       // no error: a visitor's load came first
 };
 
+/// How that which is computed of a scene is kept for the next load. Empty: it is not.
+struct KeepDerived {
+  KeepView view{};
+  KeepPoster poster{};
+};
+
 /// Loads one scene in a representation and builds its renderer with the options and pool of `core`.
 /// `id_of` makes the id from the name. `threads` threads read the file. `progress` is called
-/// repeatedly and may throw to cancel. `keep`: as LoadOptions has it. Throws InputError or
-/// UnusableTree.
+/// repeatedly and may throw to cancel. Throws InputError or UnusableTree.
 std::shared_ptr<const SceneEntry> load_scene(
     const SceneLocation& location, const SceneRepresentation& representation,
     const std::function<std::string(const std::string& name)>& id_of, const ServerConfig& config,
     const RendererOptions& core, int threads, const std::function<void(double)>& progress = {},
-    const KeepView& keep = {});
+    const KeepDerived& keep = {});
 
 }  // namespace catgs

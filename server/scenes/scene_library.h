@@ -66,7 +66,8 @@ class SceneLibrary final : public SceneSource {
   [[nodiscard]] std::shared_ptr<const std::vector<Listing>> listing() const {
     return index_.listing();
   }
-  /// Any thread. See ScenePosters.
+  /// Any thread. Takes the scene's poster from the cache, or loads the scene to make it, which then
+  /// stays for its first visitor.
   void want_poster(const std::string& id);
   /// Any thread. Finds where people can walk in a scene in memory, one scene at a time. Does
   /// nothing where that is known or under way.

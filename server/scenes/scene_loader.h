@@ -10,6 +10,7 @@
 #include "server/base/background.h"
 #include "server/config/config.h"
 #include "server/scenes/derived_files.h"
+#include "server/scenes/poster.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_trees.h"
@@ -29,11 +30,9 @@ class SceneLoader {
   /// The first scenes decide whether the server uses GPUs. Call it when they are loaded.
   void keep_core();
 
-  using Poster = std::shared_ptr<const std::string>;  // a JPEG file; null: none
-  /// Takes the scene's poster from the cache, or loads the scene for a moment to make it. No
-  /// visitor waits for it. Nothing: it gave way.
-  void load_poster(const FoundScene& found, const SceneRepresentation& representation,
-                   std::function<void(std::optional<Poster>)> then);
+  /// Reads the scene's poster from the cache. Null: it is not there.
+  void read_poster(const FoundScene& found, const SceneRepresentation& representation,
+                   std::function<void(const Poster&)> then);
   /// Loads it in the background and calls `then`. Visitors' loads come first.
   enum class For { visitors, jobs };
   void load(const FoundScene& found, const SceneRepresentation& representation, For whom,
@@ -50,8 +49,8 @@ class SceneLoader {
   [[nodiscard]] LoadedScene load_on(const FoundScene& found,
                                     const SceneRepresentation& representation,
                                     const std::stop_token& stop) const;
-  [[nodiscard]] Poster poster_of(const FoundScene& found, const SceneRepresentation& representation,
-                                 const std::stop_token& stop) const;
+  [[nodiscard]] KeepDerived keep(const FoundScene& found,
+                                 const SceneRepresentation& representation) const;
 
   const ServerConfig& config_;
   RendererOptions core_;  // fixed once the first scenes are loaded

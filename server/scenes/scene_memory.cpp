@@ -17,6 +17,7 @@ using namespace std::chrono_literals;
 
 constexpr auto retry_after_failure = 30s;
 constexpr std::size_t most_prepared = 2;
+constexpr std::size_t most_unvisited = 2;
 
 ResidencyLimits residency_limits(const ServerConfig& config) {
   constexpr std::uint64_t megabyte = 1'000'000;
@@ -40,7 +41,9 @@ SceneMemory::SceneMemory(const ServerConfig& config, SceneIndex& index, SceneTre
         return record ? record->use() : SceneUse::none;
       }),
       redrawing_(index_, trees_, residency_, loads_),
-      posters_(index_, trees_, residency_, loads_, [this] { publish(); }) {}
+      posters_(
+          index_, trees_, loads_, [this](SceneRecord& record) { load_for_poster(record); },
+          [this] { publish(); }) {}
 
 void SceneMemory::load_now(const std::string& id) {
   const FoundScene& found = index_.records().at(id).found;
@@ -59,6 +62,7 @@ void SceneMemory::failed_now(const std::string& id, const std::string& error) {
 
 SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
   std::erase_if(prepared_, [&](const Prepared& prepared) { return prepared.id == id; });
+  std::erase(unvisited_, id);
   const SceneRecord& record = index_.records().at(id);
   if (record.entry) {
     residency_.note_use(id, now);
@@ -79,8 +83,7 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
     if (redrawing_.holds_two_representations()) return SceneAwaited{1s};  // one of them goes soon
     return refusal(answer, id, bytes);
   }
-  if (residency_.visitor_waits() && (residency_.loads_in_background() || posters_.busy()))
-    loads_.give_way();
+  if (residency_.visitor_waits() && residency_.loads_in_background()) loads_.give_way();
   start_next(now);
   const double seconds = static_cast<double>(bytes) / bytes_per_second_;
   return SceneAwaited{std::chrono::seconds(1 + static_cast<std::int64_t>(seconds))};
@@ -88,7 +91,7 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
 
 void SceneMemory::prepare(const std::string& id, TimePoint now) {
   const SceneRecord* const record = index_.find(id);
-  if (!record || record->gone || record->entry || residency_.busy() || posters_.busy()) return;
+  if (!record || record->gone || record->entry || residency_.busy()) return;
   if (!trees_.representation_of(record->found)) return;
   std::erase_if(prepared_, [&](const Prepared& other) { return !residency_.resident(other.id); });
   if (prepared_.size() >= most_prepared) {
@@ -99,7 +102,9 @@ void SceneMemory::prepare(const std::string& id, TimePoint now) {
     release(oldest);
     prepared_.erase(prepared_.begin());
   }
-  if (!residency_.has_room(trees_.need_of(record->found))) return;
+  const SceneNeed need = trees_.need_of(record->found);
+  while (!residency_.has_room(need) && !unvisited_.empty()) drop_unvisited();
+  if (!residency_.has_room(need)) return;
   if (std::holds_alternative<SceneAwaited>(want(id, now))) prepared_.push_back({id, now});
 }
 
@@ -129,6 +134,27 @@ void SceneMemory::start_next(TimePoint now) {
   if (step->recall.empty()) carry_out(*step, SceneLoader::For::visitors, now);
 }
 
+void SceneMemory::load_for_poster(SceneRecord& record) {
+  const std::string& id = record.found.id;
+  const TimePoint now = clock_();
+  const auto may_leave = [this](const std::string& other) {
+    return std::ranges::find(unvisited_, other) == unvisited_.end() ? SceneUse::visitors
+                                                                    : use_of_(other);
+  };
+  const auto step = residency_.next_in_background(id, trees_.need_of(record.found), now, may_leave);
+  if (!step) return;
+  if (unvisited_.size() >= most_unvisited && step->release.empty()) drop_unvisited();
+  record.poster_tried = true;
+  carry_out(*step, SceneLoader::For::jobs, now);
+  unvisited_.push_back(id);
+}
+
+void SceneMemory::drop_unvisited() {
+  const std::string id = unvisited_.front();
+  unvisited_.erase(unvisited_.begin());
+  if (residency_.resident(id) && use_of_(id) == SceneUse::none) release(id);
+}
+
 void SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For whom,
                             TimePoint now) {
   for (const std::string& id : step.release) release(id);
@@ -147,6 +173,7 @@ void SceneMemory::release(const std::string& id) {
   log_info({.event = "scene_released", .scene = id}, "scene {} released", id);
   metrics_.scenes_released.Increment();
   residency_.drop(id);
+  std::erase(unvisited_, id);
   auto entry = std::exchange(record.entry, nullptr);
   record.walkable_area.reset();
   record.outdated = record.tree_lost = false;
@@ -160,6 +187,8 @@ void SceneMemory::on_loaded(const std::string& id, LoadedScene loaded, TimePoint
   SceneRecord* const record = index_.find(id);
   if (!loaded.entry || !record) {
     residency_.failed(id);
+    std::erase(unvisited_, id);
+    if (record && (loaded.gave_way || loaded.unusable_tree)) record->poster_tried = false;
     if (loaded.gave_way) return start_next(now);
     if (loaded.unusable_tree) {
       if (record) trees_.discard(record->found, loaded.error);
@@ -195,7 +224,7 @@ LeasedScene SceneMemory::lease(const std::string& id, bool again) {
                                                                             : record->lease();
   }
   const TimePoint now = clock_();
-  if (!again || record->gone || posters_.busy() || (record->retry_at && now < *record->retry_at) ||
+  if (!again || record->gone || (record->retry_at && now < *record->retry_at) ||
       !trees_.representation_of(record->found))
     return none;
   const auto step = residency_.next_in_background(id, trees_.need_of(record->found), now, use_of_);

@@ -50,6 +50,11 @@ class SceneMemory {
 
  private:
   void start_next(TimePoint now);
+  /// Does nothing while a scene is loaded, or where there is no room. The scene stays for its
+  /// first visitor until others need its memory.
+  void load_for_poster(SceneRecord& record);
+  /// The oldest scene that was loaded for its poster leaves, unless a job uses it.
+  void drop_unvisited();
   void carry_out(const SceneResidency::Step& step, SceneLoader::For whom, TimePoint now);
   void on_loaded(const std::string& id, LoadedScene loaded, TimePoint started, TimePoint now);
   void release(const std::string& id);
@@ -67,7 +72,8 @@ class SceneMemory {
     std::string id;
     TimePoint since;
   };
-  std::vector<Prepared> prepared_;  // and not entered since, oldest first
+  std::vector<Prepared> prepared_;      // and not entered since, oldest first
+  std::vector<std::string> unvisited_;  // loaded for their posters, oldest first
   SceneRedrawing redrawing_;
   ScenePosters posters_;
 };

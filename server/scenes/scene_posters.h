@@ -2,40 +2,37 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "server/scenes/scene_index.h"
 #include "server/scenes/scene_loader.h"
-#include "server/scenes/scene_residency.h"
 #include "server/scenes/scene_trees.h"
 
 namespace catgs {
 
-/// Loads scenes for a moment to make their posters, one at a time. Session thread only.
+/// Brings the posters of scenes that are not in memory. Session thread only.
 class ScenePosters {
  public:
-  /// `changed` is called when there is a new poster. All outlive this object, and its tasks.
-  ScenePosters(SceneIndex& index, SceneTrees& trees, SceneResidency& residency, SceneLoader& loader,
-               std::function<void()> changed)
+  /// `load` loads a scene whose poster the cache does not have. `changed` is called when there is a
+  /// new poster. All outlive this object, and its tasks.
+  ScenePosters(SceneIndex& index, SceneTrees& trees, SceneLoader& loader,
+               std::function<void(SceneRecord&)> load, std::function<void()> changed)
       : index_(index),
         trees_(trees),
-        residency_(residency),
         loader_(loader),
+        load_(std::move(load)),
         changed_(std::move(changed)) {}
 
-  /// Does nothing if the poster is there or could not be made, while a visitor waits for a scene,
-  /// or where the scene would not fit beside those in memory.
+  /// Does nothing if the poster is there or could not be made, or while another one is read.
   void want(const std::string& id);
-  [[nodiscard]] bool busy() const { return busy_; }
 
  private:
-  void start(SceneRecord& record, const SceneRepresentation& representation);
-
   SceneIndex& index_;
   SceneTrees& trees_;
-  SceneResidency& residency_;
   SceneLoader& loader_;
+  const std::function<void(SceneRecord&)> load_;
   const std::function<void()> changed_;
-  bool busy_ = false;
+  bool reads_ = false;
 };
 
 }  // namespace catgs

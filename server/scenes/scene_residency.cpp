@@ -72,9 +72,9 @@ SceneResidency::Step SceneResidency::begin(const std::string& id, std::vector<st
 
 void SceneResidency::loaded(const std::string& id, const SceneNeed& need, TimePoint now) {
   loading_.clear();
-  // One that was loaded for a background job may go as soon as a visitor needs the room.
+  // One that was loaded for a background job goes first as soon as a visitor needs the room.
   const auto since = std::exchange(in_background_, false) ? now - limits_.min_residency : now;
-  residents_.insert_or_assign(id, Resident{need, false, since, now});
+  residents_.insert_or_assign(id, Resident{need, false, since, since});
 }
 
 void SceneResidency::failed(const std::string& id) {

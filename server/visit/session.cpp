@@ -93,7 +93,7 @@ void prepare(const Request& r) {
 void reach(const Request& r) {
   const auto& [tour, stop] = r.as<Reached>();
   r.tally.reached(r.session.visit().stream().scene()->facts.scene_id, r.session.visitor().device,
-                  {tour, stop});
+                  {tour, stop}, r.session.visitor().link_id);
 }
 
 /// How requests of one kind are limited, who may send them, and who handles them. A refusal
@@ -290,7 +290,7 @@ void Session::on_tick(TimePoint now, int sessions) {
       stream.redraw(std::move(newer));
   if (visit_.life().on_show() && stream.scene())
     tally_.on_show(stream.scene()->facts.scene_id, visitor_.device,
-                   visit_.statistics().bytes_sent(), now);
+                   visit_.statistics().bytes_sent(), now, visitor_.link_id);
   else
     tally_.off_show();
   audience_.keep_talking(now);

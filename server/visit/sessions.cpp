@@ -45,7 +45,7 @@ void Sessions::add(const std::shared_ptr<ClientConnection>& connection,
     session->visit().fail(ErrorCode::server_full, why);
   };
   if (admission_.is_shut())
-    refuse("this server is shutting down");
+    session->visit().end("this server is shutting down", CloseCode::service_restart);
   else if (connections_ > options.max_sessions * (1 + options.max_spectators) + options.max_queue +
                               options.max_greeting)
     refuse("too many connections: try again in a minute");

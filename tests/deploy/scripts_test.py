@@ -244,6 +244,12 @@ class Serving(Machine):
         self.assertNotIn("catgs-render", self.calls())
         self.assertEqual(len(self.server_calls()), 1)
 
+    def test_the_load_generator_is_built_by_one_option(self):
+        for option, setting in ((["--with-load"], "ON"), ([], "OFF")):
+            self.serve(*option, "--port", self.free_port())
+            self.assertIn(f"-DCATGS_LOAD={setting}", self.calls())
+            (self.folder / "calls").unlink()
+
     def test_two_in_one_clone_build_one_after_the_other(self):
         self.stand_in("ninja", 'echo begin >>"$HOME/order"; sleep 1; echo end >>"$HOME/order"')
         outputs = []

@@ -58,7 +58,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "web_client/src/base web_client/src/text web_client/src/wire",
     "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour web_client/src/walk",
-    "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film",
+    "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film web_client/src/charts",
     "web_client/src/page", "web_client/src/author", "web_client/src/ui", "web_client/src/media web_client/src/walkable_area",
     "web_client/src",
 ]) for name in line.split()}

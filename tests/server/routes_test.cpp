@@ -52,6 +52,8 @@ TEST(Routes, PublicUrlsHaveALimitAndARight) {
                   {get, "/api/films/12ab/file", no_body, Right::none},
                   {put, "/api/films/12ab/cancel", max_sent_sidecar_bytes, Right::none},
                   {delete_, "/api/films/12ab", no_body, Right::none},
+                  {get, "/visits", no_body, Right::none},
+                  {get, "/visits.json", no_body, Right::none},
                   {get, "/", no_body, Right::none},
                   {get, "/index.html", no_body, Right::none},
                   {get, "/assets/page.js", no_body, Right::none},

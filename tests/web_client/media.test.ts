@@ -2,7 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '#client/base/vector';
-import { free_name } from '#client/media/media_folder';
+import { free_name, other_format } from '#client/media/media_folder';
 import { Sounds, type Playable } from '#client/media/sounds';
 import * as limits from '#client/tour/limits';
 import { accepted, kind_of, media_kinds } from '#client/tour/media';
@@ -238,4 +238,13 @@ describe('sounds', () => {
     sounds.resume();
     expect([voice.plays, sounds.voice]).toEqual([false, 'none']);
   });
+});
+
+it('names the formats of cameras that tours cannot show', async () => {
+  const format_of = (head: string) => other_format(new Blob([head]));
+  for (const brand of ['heic', 'heix', 'mif1'])
+    expect(await format_of(`\0\0\0\x18ftyp${brand}`)).toEqual({ format: 'HEIC', instead: 'JPEG' });
+  expect(await format_of('\0\0\0\x14ftypqt  ')).toEqual({ format: 'QuickTime', instead: 'MP4' });
+  for (const head of ['\0\0\0\x18ftypisom', '\x89PNG', '', 'heic'])
+    expect(await format_of(head)).toBeUndefined();
 });

@@ -340,7 +340,38 @@ describe('drain', () => {
     old.say({ case: 'drain', value: {} });
     old.events.closed(1001, '');
     socket(1).events.closed(1006, '');
-    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'unreachable' });
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'updating', message: '' });
+  });
+
+  it('says that the server is updated until one answers, and for five minutes at most', () => {
+    const old = go_live();
+    old.say({ case: 'drain', value: {} });
+    for (const link of [0, 1]) socket(link).events.closed(1001, 'the server is shutting down');
+    const title = (): string | undefined => {
+      const state = last_state();
+      return state && card_for(state, true)?.title;
+    };
+    expect(title()).toBe('The server is being updated');
+    const lose_next = (): void => {
+      while (last_state()?.phase === 'waiting') time.advance(100);
+      sockets.at(-1)!.events.closed(1006, '');
+    };
+    lose_next();
+    expect(title()).toBe('The server is being updated');
+    time.advance(300_000);
+    lose_next();
+    expect(title()).toBe('The server does not answer');
+  });
+
+  it('says so to those who come meanwhile, and no more once a server takes them', () => {
+    session.start();
+    socket(0).events.opened();
+    socket(0).events.closed(1012, 'this server is shutting down');
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'updating', message: '' });
+    session.retry();
+    welcome(socket(1));
+    socket(1).events.closed(1006, '');
+    expect(last_state()).toMatchObject({ phase: 'waiting', cause: 'lost' });
   });
 });
 

@@ -53,7 +53,7 @@ class UsageStatisticsTest : public testing::Test {
 TEST_F(UsageStatisticsTest, CountsStayFromOneStartToTheNext) {
   {
     const UsageStatistics statistics(folder_.path(), counts_, background_);
-    counts_.visit("hall \"A\"", DeviceKind::tablet);
+    counts_.visit("hall \"A\"", DeviceKind::tablet, "aa");
     counts_.spend("hall \"A\"", 12.5, 1'000'000'000'000);
     counts_.reach("hall \"A\"", {1, 2});
     now_s_ += day_s;
@@ -68,6 +68,7 @@ TEST_F(UsageStatisticsTest, CountsStayFromOneStartToTheNext) {
   EXPECT_EQ(hall.bytes, 1'000'000'000'000u);
   EXPECT_EQ(hall.devices[static_cast<std::size_t>(DeviceKind::tablet)], 1u);
   EXPECT_EQ(hall.stops, (std::map<StopId, std::uint64_t>{{{1, 2}, 1}}));
+  EXPECT_EQ(hall.links, (std::map<std::string, std::uint64_t>{{"aa", 1}}));
   EXPECT_EQ(files(), 2u);
   counts_.visit("garden", DeviceKind::headset);
   EXPECT_EQ(statistics.day("2025-11-26").at("garden").visits, 2u)
@@ -228,11 +229,11 @@ TEST_F(UsageStatisticsTest, NothingIsLostOrCountedTwiceAtMidnight) {
 TEST_F(UsageStatisticsTest, TheSummaryHasCountsAndTitles) {
   const UsageStatistics statistics({}, counts_, background_);
   const VisitsPage pages = page_of(statistics);
-  counts_.visit("<hall>", DeviceKind::desktop);
+  counts_.visit("<hall>", DeviceKind::desktop, "3f0c91d27a5e");
   counts_.spend("<hall>", 7200.0, 3'000'000'000);
   counts_.reach("<hall>", {0, 0});
   counts_.reach("<hall>", {0, 7});
-  titles_ = std::make_shared<const std::vector<TourTitles>>(
+  titles_.tours = std::make_shared<const std::vector<TourTitles>>(
       std::vector<TourTitles>{{"The <house>", {"Gate & door"}}});
   const auto summary = [&](std::vector<std::string> arguments) {
     return nlohmann::json::parse(rest_of(charts(pages, std::move(arguments))));
@@ -245,13 +246,35 @@ TEST_F(UsageStatisticsTest, TheSummaryHasCountsAndTitles) {
   EXPECT_EQ(days.at("y").back(), 2.0);
   EXPECT_EQ(days.at("x").size(), 30u);
   EXPECT_EQ(rows_of(all.at("parts").at(1)).dump(),
-            R"([[{"href":"/visits?days=30&scene=%3Chall%3E","text":"<hall>"},)"
+            R"([[{"href":"visits?days=30&scene=%3Chall%3E","text":"<hall>"},)"
             R"(1,2.0,120.0,1500.0,1,0,0,0,0]])");
   const auto one = summary({"scene=<hall>", "days=7"});
   EXPECT_EQ(one.at("title"), "Visits: <hall>, 7 days");
   EXPECT_EQ(rows_of(one.at("parts").at(2)).dump(),
+            R"([["3f0c91d27a5e",1],["none, or not counted by link",0]])");
+  EXPECT_EQ(rows_of(one.at("parts").at(3)).dump(),
             R"([["The <house>","Gate & door",1],["The <house>","stop 8",1]])");
   EXPECT_EQ(summary({"days=-5"}).at("title"), "Visits: all scenes, 1 days");
+}
+
+TEST_F(UsageStatisticsTest, OwnersSeeTheirScenesByTitleAndNoOthers) {
+  const UsageStatistics statistics({}, counts_, background_);
+  const VisitsPage pages = page_of(statistics);
+  titles_.scene = "The hall";
+  counts_.visit("hall-kdfmqrtv", DeviceKind::phone, "aa");
+  counts_.visit("hall-kdfmqrtv", DeviceKind::phone);
+  counts_.visit("cellar", DeviceKind::phone, "bb");
+  for (const auto& arguments : {std::vector<std::string>{}, {"scene=hall-kdfmqrtv"}}) {
+    HttpRequest request;
+    request.arguments = arguments;
+    const std::string page =
+        rest_of(pages.charts(request, [](const std::string& id) { return id == "hall-kdfmqrtv"; }));
+    EXPECT_THAT(
+        page,
+        AllOf(HasSubstr(R"("The hall","href":"visits?days=30&scene=hall-kdfmqrtv"},2,)"),
+              HasSubstr("2 visits"), HasSubstr(R"([["aa",1],["none, or not counted by link",1]])"),
+              Not(HasSubstr("cellar")), Not(HasSubstr("bb")), Not(HasSubstr("csv"))));
+  }
 }
 
 TEST_F(UsageStatisticsTest, CsvIsForSpreadsheetsAndHoldsNoFormula) {

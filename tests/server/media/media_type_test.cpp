@@ -112,6 +112,11 @@ TEST(CheckMedia, SaysWhatIsWrong) {
   const auto says = [](const char* text) { return ThrowsMessage<InputError>(HasSubstr(text)); };
   EXPECT_THAT([] { check_media("a.png", jpeg_file()); }, says("its content is image/jpeg"));
   EXPECT_THAT([] { check_media("a.svg", "<svg/>"); }, says("is of no format"));
+  for (const auto& [name, brand, words] :
+       {std::array{"a.heic", "heic", "is HEIC, which tours cannot show (save it as JPEG)"},
+        std::array{"a.jpg", "mif1", "is HEIC"}, std::array{"a.avif", "avif", "is AVIF"},
+        std::array{"a.mp4", "qt  ", "is QuickTime, which tours cannot show (save it as MP4)"}})
+    EXPECT_THAT([&] { check_media(name, mp4_file(brand)); }, says(words)) << name;
   EXPECT_THAT([] { check_media("a.png", png_file(8193, 1)); }, says("has 8193 x 1 pixels"));
 }
 

@@ -37,7 +37,7 @@ class Program {
     pid_ = ::fork();
     if (pid_ < 0) throw std::runtime_error("no process");
     if (pid_ == 0) {
-      ::dup2(log_pipe[1], STDERR_FILENO);
+      for (const int output : {STDOUT_FILENO, STDERR_FILENO}) ::dup2(log_pipe[1], output);
       const rlimit limit{descriptors, descriptors};
       if (descriptors > 0) ::setrlimit(RLIMIT_NOFILE, &limit);
       ::execv(CATGS_SERVER_PROGRAM, arguments.data());
@@ -250,6 +250,16 @@ TEST(ServerProgram, ATokenForANameSaysWhatThatMeans) {
   EXPECT_EQ(saves.exit_status(), 2);
   Program exact({"token", "--token-key-file", key, "--scene", "hall-kdfmqrtv"}, "#token=TOKEN\n");
   EXPECT_THAT(exact.log(), AllOf(Not(HasSubstr("is a name")), HasSubstr("its id is ")));
+  Program link({"token", "--token-key-file", key, "--scene", "hall-kdfmqrtv", "--role", "author",
+                "--expires", "12h", "--address", "https://museum.example/3d"},
+               "ends this link\n");
+  EXPECT_THAT(
+      link.log(),
+      AllOf(testing::ContainsRegex("https://museum.example/3d/\\?scene=hall-kdfmqrtv&author#token="
+                                   "[A-Za-z0-9_-]+\\.[A-Za-z0-9_-]+\n"),
+            testing::ContainsRegex("valid for 12h, until 20[0-9-]+ [0-9:]+ UTC\n")));
+  Program unclear({"token", "--token-key-file", key, "--address", "museum.example"}, "example/");
+  EXPECT_THAT(unclear.log(), HasSubstr("--address museum.example: is no address of a page"));
   EXPECT_EQ(exact.exit_status(), 0);
 }
 

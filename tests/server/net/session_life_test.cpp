@@ -206,6 +206,10 @@ TEST(SessionLifeOnSockets, FramesGoOnUntilTheClientHasMoved) {
   old_server.stop();
   EXPECT_GT(old_link.receive_message(v1::ServerMessage::kDrain).drain().deadline_ms(), 0u);
   EXPECT_EQ(http_get(old_server.port(), "/readyz").status, 503);
+  WireClient newcomer(old_server.port());
+  std::optional<v1::Error> error;
+  EXPECT_EQ(newcomer.receive_until_closed(&error).close_code, 1012);
+  EXPECT_FALSE(error) << "the server is not full";
   old_link.send_pose(2, 0.2f);
   EXPECT_EQ(old_link.receive_frame().header.pose_id(), 2u);
 

@@ -11,6 +11,20 @@
 namespace catgs::test {
 namespace {
 
+TEST(OwnVisits, AreForHoldersOfAuthorLinks) {
+  const RunningServer server([](ServerConfig& config) { config.token_key_file = link_key_file(); });
+  const auto counts_by = [&](const std::string& token) {
+    return http_get(server.port(), "/visits.json", bearer(token));
+  };
+  const HttpReply own = counts_by(make_link("author"));
+  EXPECT_EQ(own.status, 200);
+  EXPECT_THAT(own.body, AllOf(HasSubstr("Visits: your scenes"), Not(HasSubstr("csv"))));
+  EXPECT_EQ(counts_by(make_link("viewer")).status, 401);
+  EXPECT_EQ(counts_by(make_link("author", "elsewhere")).status, 401);
+  EXPECT_EQ(http_get(server.port(), "/visits.json").status, 401);
+  EXPECT_EQ(http_get(server.port(), "/visits.csv").status, 404);
+}
+
 class Visits : public testing::Test {
  protected:
   static void SetUpTestSuite() {

@@ -17,11 +17,10 @@ TEST_F(SceneLibraryTime, ListingsShareWhatPagesGetOfAScene) {
 TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
   library_->want_poster(id("a"));
   run_until([&] { return listed("a").poster != nullptr; });
-  EXPECT_FALSE(listed("a").loaded) << "it was there for a moment";
   load("b");
   EXPECT_NE(listed("b").poster, nullptr);
   tick(60s);
-  load("a");
+  visit("a");
   tick(60s);
   load("c");
   EXPECT_FALSE(listed("b").loaded);
@@ -78,10 +77,47 @@ TEST_F(SceneLibraryTime, NobodyWaitsForAPoster) {
   library_->want_poster(id("c"));  // one at a time
   run_until([&] { return has_poster("b"); });
   EXPECT_FALSE(has_poster("c"));
-  load("b");
+  const Entry seen = visit("b");
   library_->want_poster(id("c"));  // there is no room for it
   EXPECT_TRUE(awaited("c")) << "a visitor may still ask";
   EXPECT_TRUE(in_memory("a") && in_memory("b"));
+}
+
+TEST_F(SceneLibraryTime, SceneThatWasLoadedForItsPosterIsThereForItsVisitor) {
+  library_->want_poster(id("a"));
+  run_until([&] { return listed("a").poster != nullptr; });
+  EXPECT_TRUE(std::holds_alternative<Entry>(library_->want(id("a"), now_)));
+  EXPECT_EQ(metrics_.scenes_loaded.Value(), 1);
+}
+
+TEST_F(SceneLibraryTime, VisitorJoinsTheLoadForAPoster) {
+  const CapturedLog log;
+  const std::string loading = "loading " + (folder_ / "a.ply").string();
+  library_->want_poster(id("a"));
+  run_until([&] { return log.text().find(loading) != std::string::npos; });
+  EXPECT_TRUE(awaited("a") || in_memory("a"));
+  visit("a");
+  EXPECT_EQ(log.text().find(loading), log.text().rfind(loading)) << "it is loaded once";
+}
+
+TEST_F(SceneLibraryTime, ScenesThatWereLoadedForPostersLeaveForOthers) {
+  const auto show = [&](const char* name) {
+    library_->want_poster(id(name));
+    run_until([&] { return listed(name).poster != nullptr; });
+  };
+  const Entry seen = load("a");
+  show("b");
+  show("c");
+  EXPECT_TRUE(in_memory("c"));
+  EXPECT_FALSE(in_memory("b")) << "there is room for one beside that of a visitor";
+  library_->prepare(id("b"), now_);
+  run_until([&] { return in_memory("b"); });
+  EXPECT_FALSE(in_memory("c"));
+  config_.scene_memory_mb = 0;
+  start();
+  for (const char* name : {"a", "b", "c"}) show(name);
+  EXPECT_TRUE(in_memory("b") && in_memory("c"));
+  EXPECT_FALSE(in_memory("a")) << "two at most stay";
 }
 
 TEST_F(SceneLibraryTime, TellsOfScenesBeforeTheyAreLoaded) {

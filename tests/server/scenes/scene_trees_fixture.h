@@ -24,12 +24,12 @@ class SceneTreesTest : public LibraryTest {
     run_until([&] { return entry(name)->in_pages; });
   }
   std::string state(const std::string& name) const { return listed(name).state; }
-  std::vector<fs::path> trees() const {
-    std::vector<fs::path> trees;
+  std::vector<fs::path> trees() const { return kept(".tree"); }
+  std::vector<fs::path> kept(const std::string& extension) const {
+    std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(folder_ / "trees"))
-      if (entry.path().filename() != "lock" && entry.path().extension() != ".view")
-        trees.push_back(entry.path());
-    return trees;
+      if (entry.path().extension() == extension) files.push_back(entry.path());
+    return files;
   }
   static std::string bytes_in(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);

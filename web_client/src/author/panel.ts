@@ -1,3 +1,4 @@
+import { load_part } from '../base/load_part';
 import type { Eye } from '../camera/eye';
 import { by_id, on_click, save_file } from '../page/dom';
 import type { Navigation } from '../page/navigation';
@@ -99,6 +100,9 @@ export class AuthorPanel {
     this.film_?.look();
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
+    const visits = by_id('author-visits', HTMLAnchorElement);
+    visits.hidden = token === undefined;
+    visits.href = `visits?scene=${encodeURIComponent(this.tools_.navigation.scene_id)}`;
     this.replace_.hidden = true;
     this.tools_.media.use(this.tools_.navigation.scene_id, token);
     this.draft_.load(tours, about);
@@ -180,7 +184,7 @@ export class AuthorPanel {
 
   private async open_film(): Promise<void> {
     const fields = by_id('author-film-fields', HTMLElement);
-    const { FilmPanel } = await import('./film_panel');
+    const { FilmPanel } = await load_part(() => import('./film_panel'));
     if (this.film_) return this.film_.look();
     this.film_ = new FilmPanel(fields, {
       navigation: this.tools_.navigation,

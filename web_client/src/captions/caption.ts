@@ -1,4 +1,5 @@
 // Shows captions with their Markdown. Captions without any need nothing but the page.
+import { load_part } from '../base/load_part';
 import type { pieces_of } from './markdown';
 import { may_be_markdown, text_of, type Piece } from './pieces';
 
@@ -12,7 +13,7 @@ export async function prepare(captions: readonly string[]): Promise<void> {
 /** Undefined where the server is away. */
 async function read(caption: string): Promise<readonly Piece[] | undefined> {
   try {
-    reader ??= import('./markdown');
+    reader ??= load_part(() => import('./markdown'));
     return (await reader).pieces_of(caption);
   } catch (error) {
     console.warn('captions stay as they are written', error);
@@ -20,6 +21,10 @@ async function read(caption: string): Promise<readonly Piece[] | undefined> {
     return undefined;
   }
 }
+
+/** Until then nobody sees the signs of Markdown. */
+const late = (): Promise<undefined> =>
+  new Promise((resolve) => setTimeout(() => resolve(undefined), 1000));
 
 /** The words of a caption, without its Markdown. */
 export async function caption_words(caption: string): Promise<string> {
@@ -41,7 +46,13 @@ export class CaptionView {
   async show(caption: string): Promise<void> {
     if (caption === this.shown_) return;
     this.shown_ = caption;
-    const pieces = may_be_markdown(caption) ? await read(caption) : undefined;
+    const reading = may_be_markdown(caption) ? read(caption) : undefined;
+    const soon = reading && (await Promise.race([reading, late()]));
+    this.fill(caption, soon);
+    if (reading && !soon) this.fill(caption, await reading);
+  }
+
+  private fill(caption: string, pieces: readonly Piece[] | undefined): void {
     if (caption !== this.shown_) return; // the visitor went on meanwhile
     this.host_.replaceChildren(...(pieces ?? [caption]).map(node_of));
     this.changed_();

@@ -2,6 +2,8 @@
 // inside the page. For the server's /visits it comes from the page's own address with ".json" added.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
+import { browser_storage } from '../base/browser_storage';
+import { AccessToken } from '../session/token';
 import type { ChartDocument, Link, Plot, Table } from './chart_document';
 
 /** For both light and dark pages. */
@@ -108,10 +110,14 @@ function show({ title, facts, links = [], parts }: ChartDocument): void {
   }
 }
 
+/** The public port asks authors for the token of their link. */
 async function load(): Promise<ChartDocument> {
   const inside = document.getElementById('document')?.textContent;
   if (inside) return JSON.parse(inside) as ChartDocument;
-  const answer = await fetch(`${location.pathname}.json${location.search}`);
+  const token = new AccessToken(location, history, browser_storage('sessionStorage')).value;
+  const headers: Record<string, string> = token ? { 'catgs-token': token } : {};
+  const answer = await fetch(`${location.pathname}.json${location.search}`, { headers });
+  if (answer.status === 401) throw new Error('open it by an author link');
   if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
   return (await answer.json()) as ChartDocument;
 }

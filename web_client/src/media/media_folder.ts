@@ -37,6 +37,8 @@ export class MediaFolder {
   /** Sends a file; resolves with the name that it has there. Throws an error that people can read. */
   async add(file: File, progress: (words: string) => void): Promise<string> {
     if (file.size > max_media_bytes) throw new Error(text.media.too_large);
+    const other = await other_format(file);
+    if (other) throw new Error(text.media.not_shown({ name: file.name, ...other }));
     const name = free_name(file.name, this.names);
     const path = scene_path(this.scene_id, `media/${encodeURIComponent(name)}`);
     await send(server_address(location.href, path), this.token_, file, (share) =>
@@ -45,6 +47,22 @@ export class MediaFolder {
     this.names = [...this.names, name].sort();
     return name;
   }
+}
+
+const heic = { format: 'HEIC', instead: 'JPEG' };
+const avif = { format: 'AVIF', instead: 'JPEG' };
+/** Formats of cameras that tours do not show, by their brands (ISO 14496-12). */
+const other_formats: Readonly<Record<string, { format: string; instead: string }>> = {
+  ...{ heic, heix: heic, heim: heic, heis: heic, hevc: heic, hevx: heic, mif1: heic, msf1: heic },
+  ...{ avif, avis: avif, 'qt  ': { format: 'QuickTime', instead: 'MP4' } },
+};
+
+/** The format of a file that tours do not show, if its first bytes tell. */
+export async function other_format(
+  file: Blob,
+): Promise<{ format: string; instead: string } | undefined> {
+  const head = new TextDecoder('latin1').decode(await file.slice(0, 12).arrayBuffer());
+  return head.slice(4, 8) === 'ftyp' ? other_formats[head.slice(8)] : undefined;
 }
 
 /** A name that the server takes and that no other file has. Pure. */

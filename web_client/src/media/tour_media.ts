@@ -1,5 +1,6 @@
 // Loads what shows, plays and edits the media of tours, where it is needed.
 import type { MediaFields } from '../author/stops';
+import { load_part } from '../base/load_part';
 import { Signal } from '../base/signal';
 import { make } from '../page/dom';
 import type { TourState } from '../tour/player';
@@ -47,7 +48,7 @@ export class TourMedia implements TourMediaPart {
     if (this.loading_) return;
     this.loading_ = true;
     try {
-      const { MediaPart: Part } = await import('./media_part');
+      const { MediaPart: Part } = await load_part(() => import('./media_part'));
       this.part_ = new Part(this.token_, () => this.enlarged.emit());
     } catch (error) {
       console.warn('the media of the tours cannot be shown', error); // the server is away
@@ -86,7 +87,7 @@ export class TourMediaFields implements MediaFields {
   private filled(fill: (fields: AuthorMedia) => HTMLElement): HTMLElement {
     if (this.fields_) return fill(this.fields_);
     const slot = make('div');
-    void import('./author_media').then(
+    void load_part(() => import('./author_media')).then(
       ({ AuthorMedia: Fields }) => {
         if (!this.fields_) {
           this.fields_ = new Fields();

@@ -14,6 +14,8 @@ import type { WaitCause } from './state';
 export const silence_ms = 3000; // the server speaks at least once a second
 export const greeting_ms = 10_000; // to open the connection and to be answered the first time
 
+const restart_code = 1012; // of servers that take nobody in any more
+
 interface LinkEnvironment {
   open: OpenSocket;
   clock: Clock;
@@ -47,7 +49,10 @@ export class Link {
         this.send({ case: 'hello', value: hello() });
       },
       message: (data) => this.heard(data),
-      closed: (_code, reason) => listener_.lost(this.opened_ ? 'lost' : 'unreachable', reason),
+      closed: (code, reason) => {
+        const cause = code === restart_code ? 'updating' : this.opened_ ? 'lost' : 'unreachable';
+        listener_.lost(cause, reason);
+      },
     });
     this.watch();
   }

@@ -26,8 +26,12 @@ export async function list_scenes(
   }
 }
 
+const first_try_ms = 1000; // the server may have kept it
+const next_try_ms = 5000;
+const tries = 60; // five minutes: a scene that is not loaded by then has more important visitors before it
+
 /** A still of the scene; 'later': the server has none yet; undefined: there will be none. */
-export async function fetch_poster(
+async function fetch_poster(
   page_url: string,
   token: string,
   scene_id: string,
@@ -41,6 +45,21 @@ export async function fetch_poster(
     console.warn('no poster could be shown', error);
     return undefined;
   }
+}
+
+/** Asks until the poster is there. Undefined: there is none, or `is_over` says that nobody needs it any more. */
+export async function await_poster(
+  page_url: string,
+  token: string,
+  scene_id: string,
+  is_over: () => boolean = () => false,
+): Promise<Blob | undefined> {
+  for (let i = 0; i < tries && !is_over(); ++i) {
+    const poster = await fetch_poster(page_url, token, scene_id);
+    if (poster !== 'later') return is_over() ? undefined : poster;
+    await new Promise((resolve) => setTimeout(resolve, i === 0 ? first_try_ms : next_try_ms));
+  }
+  return undefined;
 }
 
 /** What people call the scene: its id ("hall-kdfmqrtv") without the digest of its path. */

@@ -58,6 +58,7 @@ interface SessionEnvironment {
 
 const stable_ms = 5000; // after a connection that lived this long, backoff starts anew
 const tries_to_go_along = 3; // for about a second: a host's page presents again when it is in its new scene
+const longest_update_us = 300e6; // after that, a server that is away is not called updated any more
 const keep_alive_ms = 10_000;
 const congested_bytes = 32 * 1024;
 const congestion_poll_ms = 20;
@@ -75,6 +76,7 @@ export class Session {
   private resume_token_ = '';
   private last_pose_: PoseInit | undefined;
   private path_: readonly PoseInit[] = [];
+  private update_until_us_ = 0; // what happens to connections until then belongs to an update
   private paused_ = false;
   private left_scene_: string | undefined; // as the greeting named it; until the selected one is there
   private readonly kept_ = new Map<ClientBody['case'], ClientBody>();
@@ -203,6 +205,7 @@ export class Session {
 
   private lost(link: Link, cause: WaitCause, message: string): void {
     link.close();
+    if (cause === 'updating') this.expect_update();
     if (link === this.successor_) {
       this.successor_ = undefined;
       this.open_successor_later();
@@ -213,8 +216,13 @@ export class Session {
       }
       const lived_ms = link.welcome ? (this.env_.clock.now_us() - link.welcomed_us) / 1000 : 0;
       if (lived_ms >= stable_ms) this.attempt_ = 0;
-      this.wait(cause, message);
+      const updating = cause !== 'refused' && this.env_.clock.now_us() < this.update_until_us_;
+      this.wait(updating ? 'updating' : cause, updating ? '' : message);
     }
+  }
+
+  private expect_update(): void {
+    this.update_until_us_ = this.env_.clock.now_us() + longest_update_us;
   }
 
   private wait(cause: WaitCause, message: string): void {
@@ -273,6 +281,7 @@ export class Session {
         this.refused(link, body.value);
         break;
       case 'drain':
+        this.expect_update();
         if (link === this.link_ && !this.successor_) this.successor_ = this.open_link();
         break;
       case 'heartbeat':
@@ -283,6 +292,7 @@ export class Session {
   private welcomed(link: Link, welcome: Welcome): void {
     link.welcome = welcome;
     link.welcomed_us = this.env_.clock.now_us();
+    this.update_until_us_ = 0;
     if (welcome.config) link.config = welcome.config;
     if (welcome.resumeToken) this.resume_token_ = welcome.resumeToken;
     this.led(welcome);

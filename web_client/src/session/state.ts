@@ -12,6 +12,7 @@ export type SessionState =
 
 export type WaitCause =
   | 'unreachable' // no connection could be opened
+  | 'updating' // the server ends, and another takes its place
   | 'lost' // an open connection was closed
   | 'silent' // an open connection said nothing for too long
   | 'no_host' // this page watches, and nobody presents now

@@ -23,7 +23,8 @@ const translations: Readonly<Record<Exclude<Language, 'en'>, Load>> = {
 export async function load_texts(language: Language, locale: string): Promise<Texts> {
   if (language === 'en') return messages(english, language, locale);
   // A test compares the keys and the values in the texts: they are those of English.
-  const translation = (await translations[language]()).default as typeof english;
+  const load = translations[language];
+  const translation = (await load().catch(load)).default as typeof english;
   return messages(translation, language, locale);
 }
 

@@ -2,15 +2,12 @@
 import { by_id, make } from '../page/dom';
 import {
   credit_line,
-  fetch_poster,
+  await_poster,
   scene_address,
   scene_labels,
   type SceneListing,
 } from '../session/scenes';
 import { text } from '../text/text';
-
-const next_try_ms = 5000;
-const tries = 60; // five minutes: a scene that is not loaded by then has more important visitors before it
 
 export function show_gallery(scenes: readonly SceneListing[], token: string): void {
   const labels = scene_labels(scenes);
@@ -51,13 +48,6 @@ async function show_poster(
   scene_id: string,
   token: string,
 ): Promise<void> {
-  for (let i = 0; i < tries; ++i) {
-    const poster = await fetch_poster(location.href, token, scene_id);
-    if (poster instanceof Blob) {
-      picture.src = URL.createObjectURL(poster);
-      return;
-    }
-    if (poster === undefined) return;
-    await new Promise((resolve) => setTimeout(resolve, next_try_ms));
-  }
+  const poster = await await_poster(location.href, token, scene_id);
+  if (poster) picture.src = URL.createObjectURL(poster);
 }

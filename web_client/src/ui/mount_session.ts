@@ -1,4 +1,5 @@
 // Starts the session in the worker, and shows what becomes of it.
+import { load_part, part_missing } from '../base/load_part';
 import { remember_rung, remembered_rung } from '../decode/decoder_memory';
 import { has_webcodecs } from '../decode/video_decoder';
 import { by_id } from '../page/dom';
@@ -30,6 +31,10 @@ export function mount_session(
     if (scene) show_scene_title(scene, sceneIds.length > 1);
   });
   worker.on('notice', ({ message }) => notice.show(message, 20));
+  part_missing.listen((missing) => {
+    if (missing) notice.show(text.cards.part_missing);
+    else notice.withdraw(text.cards.part_missing);
+  });
   const poster = new Poster();
   worker.on('presented', () => poster.end());
   if (scene_id) void poster.show(location.href, scene_id, token.value);
@@ -41,7 +46,7 @@ export function mount_session(
   // Visitors hear what it means to them, and the console has the reason.
   const tell_of_jpeg = (why: (texts: (typeof console_texts)['jpeg']) => string): void => {
     notice.show(text.jpeg.slower, 20);
-    import('../text/console').then(
+    load_part(() => import('../text/console')).then(
       ({ console_texts: { jpeg } }) => console.warn(why(jpeg)),
       (error: unknown) => console.warn('pictures arrive as JPEG', error), // the server is away
     );

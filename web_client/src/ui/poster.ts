@@ -1,5 +1,5 @@
 import { by_id } from '../page/dom';
-import { fetch_poster } from '../session/scenes';
+import { await_poster } from '../session/scenes';
 
 /** Shows a still of the scene until the first picture arrives, which takes long in a queue. */
 export class Poster {
@@ -7,8 +7,8 @@ export class Poster {
   private over_ = false;
 
   async show(page_url: string, scene_id: string, token: string): Promise<void> {
-    const poster = await fetch_poster(page_url, token, scene_id);
-    if (this.over_ || !(poster instanceof Blob)) return;
+    const poster = await await_poster(page_url, token, scene_id, () => this.over_);
+    if (!poster) return;
     this.image_.src = URL.createObjectURL(poster);
     this.image_.hidden = false;
   }

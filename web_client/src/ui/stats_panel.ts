@@ -1,3 +1,4 @@
+import { load_part } from '../base/load_part';
 import { by_id, make, save_file } from '../page/dom';
 import type { Toolbar } from '../page/toolbar';
 import type { Sides } from '../present/warp';
@@ -106,7 +107,7 @@ export class StatsPanel {
   private async load_charts(): Promise<void> {
     this.opened_ = true;
     try {
-      const { StatsCharts } = await import('./stats_charts');
+      const { StatsCharts } = await load_part(() => import('./stats_charts'));
       this.charts_ = new StatsCharts(this.plots_);
       this.charts_.show(this.history_);
     } catch (error) {

@@ -1,5 +1,6 @@
 // Walking on the walkable area of the scene, and its floor plan. Both load when somebody needs them.
 import { browser_timers } from '../base/clock';
+import { load_part } from '../base/load_part';
 import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
@@ -116,7 +117,7 @@ export class WalkableArea {
   }
 
   private async make_walking(map: WalkMap): Promise<Walking | undefined> {
-    const { Walking } = await import('./walking');
+    const { Walking } = await load_part(() => import('./walking'));
     if (map !== this.map_ || this.walking_) return this.walking_;
     const { worker, navigation } = this.parts_;
     this.walking_ = new Walking(
@@ -136,7 +137,7 @@ export class WalkableArea {
     const { map_: map, parts_: parts } = this;
     if (!map) return void this.loader_.want();
     const [{ PlanPanel, Dollhouse, house_around }, walking] = await Promise.all([
-      import('./plan'),
+      load_part(() => import('./plan')),
       this.make_walking(map),
     ]);
     const house = await house_around(map);

@@ -1,4 +1,5 @@
 // Fetches where people can walk in the scene: when somebody walks or opens the plan, or else when the page is idle.
+import { load_part } from '../base/load_part';
 import { ask_server, scene_path } from '../base/server';
 import { Signal } from '../base/signal';
 import type { AccessToken } from '../session/token';
@@ -65,7 +66,7 @@ export class WalkMapLoader {
 
   private async read(file: ArrayBuffer): Promise<WalkMap | undefined> {
     try {
-      const { read_walk_file } = await import('../walk/walk_map');
+      const { read_walk_file } = await load_part(() => import('../walk/walk_map'));
       return await read_walk_file(file);
     } catch (error: unknown) {
       console.warn(error);
