@@ -133,13 +133,16 @@ asio::awaitable<void> Connection::send_poses() {
   begin_us_ = now_us();
   std::int64_t moving_since_us = begin_us_;
   const std::int64_t move_us = microseconds(settings_.manners.move_for_s);
+  const std::int64_t stay_us = microseconds(settings_.manners.leave_every_s);
+  const bool leaves = stay_us > 0 && begin_us_ + stay_us < settings_.stop_us;
+  const std::int64_t end_us = leaves ? begin_us_ + stay_us : settings_.stop_us;
   while (true) {
     if (settings_.manners.rest_for_s > 0.0 && now_us() - moving_since_us >= move_us) {
       co_await rest();
       moving_since_us = now_us();
     }
     const std::int64_t due_us = begin_us_ + replay.next_time_us();
-    if (due_us >= settings_.stop_us) break;
+    if (due_us >= end_us) break;
     co_await wait_until(clock_time(due_us));
     if (stalled()) {  // the poses meanwhile are never taken
       co_await wait_until(clock_time(settings_.stall_to_us));
@@ -158,13 +161,13 @@ asio::awaitable<void> Connection::send_poses() {
     report_.stats.pose_sent(sample.pose_id(), now);
     say(message);
   }
-  co_await wait_until(clock_time(settings_.stop_us));
+  co_await wait_until(clock_time(end_us));
   v1::ClientMessage message;
   message.mutable_bye();
   say(message);
   bye_said_ = true;
-  end_ = End::finished;
-  co_await wait_until(clock_time(settings_.stop_us + 2'000'000));  // for the outbox to end it all
+  end_ = leaves ? End::left : End::finished;
+  co_await wait_until(clock_time(end_us + 2'000'000));  // for the outbox to end it all
 }
 
 /// Behaves like a browser whose visitor stands still: at the next refresh it says that nothing

@@ -25,12 +25,12 @@ struct SessionState {
 /// decoding, and the bad habits that its settings give it.
 class Connection {
  public:
-  enum class End { finished, lost, refused };
+  enum class End { finished, left, lost, refused };
 
   Connection(const SessionSettings& settings, SessionContext context, SessionState& state,
              SessionReport& report, const boost::asio::any_io_executor& executor);
 
-  /// Lives until the session's stop time or the connection's end. Never throws.
+  /// Lives until the session's stop time, its visitor leaves, or the connection ends. Never throws.
   boost::asio::awaitable<End> run();
 
  private:

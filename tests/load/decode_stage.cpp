@@ -29,7 +29,8 @@ DecodeStage::DecodeStage(const SessionSettings& settings, asio::thread_pool& dec
       decoders_(decoders),
       report_(report),
       callbacks_(std::move(callbacks)),
-      filled_(executor) {}
+      filled_(executor),
+      decoder_lost_us_(now_us()) {}
 
 bool DecodeStage::has_work() const {
   if (!settings_.manners.decode) return settings_.manners.decode_time_s > 0.0;
@@ -45,7 +46,21 @@ bool DecodeStage::picture_is_due() const {
   return now_us() >= settings_.start_us + static_cast<std::int64_t>(part * span_us);
 }
 
+void DecodeStage::lose_decoder() {
+  const std::int64_t every_us = microseconds(settings_.manners.lose_decoder_every_s);
+  if (every_us == 0 || now_us() < decoder_lost_us_ + every_us) return;
+  decoder_lost_us_ = now_us();
+  ++report_.stats.counts.decoders_lost;
+  codec_.reset();  // the next item gets a decoder of its own
+  wait_for_idr_ = true;
+  for (Item& item : std::exchange(queue_, {})) {
+    item.ack.set_dropped(true);
+    callbacks_.acknowledge(item.ack, 0);
+  }
+}
+
 void DecodeStage::take(const FrameMessage& frame, const v1::Ack& ack) {
+  lose_decoder();
   const bool independent = frame.header.idr() || frame.header.codec() == v1::CODEC_MJPEG;
   const bool full = queue_.size() == max_queued;
   wait_for_idr_ = full || (wait_for_idr_ && !independent);

@@ -52,6 +52,8 @@ class DecodeStage {
     DecodedPicture picture;
     std::int64_t duration_us = 0;
   };
+  /// Forgets the decoder and what it has not decoded yet, when its time has come.
+  void lose_decoder();
   boost::asio::awaitable<void> decode(Item& item);
   boost::asio::awaitable<Decoded> decode_on_pool(const Item& item);
   /// In the middles of equal parts of the session's time.
@@ -70,6 +72,7 @@ class DecodeStage {
   std::optional<v1::Codec> codec_;
   v1::SceneFacts scene_;
   bool wait_for_idr_ = true;
+  std::int64_t decoder_lost_us_;  // last, or when it was made
 };
 
 }  // namespace catgs::load

@@ -34,7 +34,9 @@ constexpr NamedCount counts[] = {{"frames", &Counts::frames},
                                  {"errors", &Counts::errors},
                                  {"decode_errors", &Counts::decode_errors},
                                  {"frames_skipped", &Counts::frames_skipped},
-                                 {"reconnects", &Counts::reconnects}};
+                                 {"reconnects", &Counts::reconnects},
+                                 {"leaves", &Counts::leaves},
+                                 {"decoders_lost", &Counts::decoders_lost}};
 
 // A picture at rest with this much, of chroma at half the size too, is one that stays.
 constexpr double sharp_db = 38.0;

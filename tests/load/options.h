@@ -31,6 +31,8 @@ struct Manners {
   bool acknowledge = true;         // false plays a client that has stopped reading its screen
   int flood_hz = 0;                // messages a second beyond what a client would send
   double reconnect_every_s = 0.0;  // 0: never; all sockets are dropped at the same time
+  double leave_every_s = 0.0;      // 0: never; the visitor leaves, and another one comes at once
+  double lose_decoder_every_s = 0.0;  // 0: never; the decoder and its queue are gone, as with a GPU
   double stall_at_s = 0.0;   // neither reads nor writes from here on, as a stopped process …
   double stall_for_s = 0.0;  // … for this long; 0: no stall
 };

@@ -22,6 +22,11 @@ boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContex
     const std::uint64_t frames_before = report.stats.counts.frames;
     Connection connection(settings, context, state, report, executor);
     const Connection::End end = co_await connection.run();
+    if (end == Connection::End::left) {  // the next visitor knows nothing of this one's session
+      state = {.next_pose_id = state.next_pose_id};  // by which the statistics find a pose
+      ++report.stats.counts.leaves;
+      continue;
+    }
     if (end != Connection::End::lost) break;
     report.stats.interrupted(now_us());
     if (report.stats.counts.frames > frames_before) pause = first_pause;

@@ -40,6 +40,8 @@ struct Counts {
   std::uint64_t decode_errors = 0;
   std::uint64_t frames_skipped = 0;  // not decoded: the decoder's queue was full
   std::uint64_t reconnects = 0;
+  std::uint64_t leaves = 0;  // followed by another visitor
+  std::uint64_t decoders_lost = 0;
 };
 
 /// The books of one session, all on the client's own clock. Pure; memory is bounded.
