@@ -131,6 +131,7 @@ struct SceneFacts {
   glm::vec3 limits_max{0.0f};
   float near_z = 0.2f;
   float scale = 1.0f;
+  bool start_enclosed = false;
   glm::dvec3 origin{0.0};  // that all places on the wire are about, see scene_origin.h
   SceneAbout about;
 };

@@ -77,7 +77,7 @@ export class WalkableArea {
       this.button_.hidden = !map;
       if (map === 'large') return;
       this.map_ = map;
-      if (navigation.camera.mode === 'walk') this.walk();
+      if (navigation.camera.mode === 'walk' || navigation.looks_by_default) this.walk();
       if (!this.panel_.hidden) this.open_plan().catch(warn);
     });
   }
@@ -111,8 +111,15 @@ export class WalkableArea {
 
   private walk(): void {
     const { map_: map } = this;
-    if (map) this.make_walking(map).catch(warn);
+    if (map) this.begin_walking(map).catch(warn);
     else void this.loader_.want();
+  }
+
+  /** Where the scene or a link begins with walking, visitors first see what its author has chosen. */
+  private async begin_walking(map: WalkMap): Promise<void> {
+    const walking = await this.make_walking(map);
+    if (!walking || !this.chose_walk_ || (await walking.come_down())) return;
+    this.parts_.notice.show(text.floor_plan.no_floor, 10);
   }
 
   private async make_walking(map: WalkMap): Promise<Walking | undefined> {
@@ -127,8 +134,7 @@ export class WalkableArea {
       },
       map,
     );
-    // Where the scene or a link begins with walking, visitors first see what its author has chosen.
-    navigation.set_walker(this.walking_.walker, this.chose_walk_);
+    navigation.set_walker(this.walking_.walker);
     return this.walking_;
   }
 
