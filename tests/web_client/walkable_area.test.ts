@@ -6,6 +6,7 @@ import { no_axes } from '#client/camera/movement';
 import { WalkMapLoader } from '#client/walkable_area/walk_map_loader';
 import { plan_picture } from '#client/walkable_area/plan_picture';
 import { cells_of, px_of } from '#client/walkable_area/plan_view';
+import { door_ahead, metres_per_unit } from '#client/walk/door';
 import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
@@ -158,6 +159,27 @@ describe('walking', () => {
     hold(camera, 0.1);
     rest(camera);
     expect(camera.pose.position[2]).toBeCloseTo(2.72 + eye_m, 1);
+  });
+});
+
+describe('a door before the author', () => {
+  it('has 2 m where eyes have 1.6 m, and stands on the floor', () => {
+    const position: Vec3 = [-1, 1, eye_m];
+    const orientation = look_at(position, [-1, 9, eye_m - 1], up);
+    const [left, above, , right] = door_ahead(map, { position, orientation, fov_y_rad: 1 })!;
+    expect_vec(sub(above!, left!), [0, 0, (2 / 1.6) * eye_m], 3);
+    expect_vec(sub(right!, left!), [(0.9 / 1.6) * eye_m, 0, 0], 3);
+    expect(left![2]).toBeCloseTo(0, 1);
+    expect(metres_per_unit({ ...map, cell: 0.2 })).toBeCloseTo(0.5, 2);
+  });
+
+  it('stands nowhere without a floor', () => {
+    const eye = {
+      position: [-90, 1, eye_m] as Vec3,
+      orientation: look_at([0, 0, 0], [1, 0, 0], up),
+      fov_y_rad: 1,
+    };
+    expect(door_ahead(map, eye)).toBeUndefined();
   });
 });
 

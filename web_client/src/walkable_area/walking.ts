@@ -69,6 +69,7 @@ export class Walking {
     this.walker = new MapWalker(map);
     this.eye_ = navigation.eye;
     this.picture_.id = 'floor-ring';
+    this.picture_.setAttribute('class', 'on-floor');
     this.picture_.setAttribute('aria-hidden', 'true');
     this.picture_.append(this.ring_);
     view.append(this.picture_);
