@@ -6,6 +6,7 @@ import type { Ray } from './ray';
 export type AskDistance = (ray: Ray) => Promise<number>;
 
 const most_known = 16;
+const asked_again = 0.75; // of what was asked: then the rest follows
 
 /** A way that the camera wants to go. World units. */
 export interface WantedWay {
@@ -47,7 +48,7 @@ export class ClearWay {
       const along = along_of(way, want.to, width);
       if (along === undefined) continue;
       if (along <= way.clear - width) {
-        if (along > way.asked / 2) this.ask_along(ask, want);
+        if (along > asked_again * way.asked) this.ask_along(ask, want);
         return true;
       }
       const before = along_of(way, want.from, width);

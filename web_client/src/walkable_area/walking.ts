@@ -95,7 +95,9 @@ export class Walking {
   async come_down(): Promise<boolean> {
     const { camera } = this.parts_.navigation;
     const { position } = camera.pose;
-    if (camera.mode !== 'walk' || camera.is_flying) return true;
+    const waits = (): boolean =>
+      camera.mode === 'walk' && !camera.is_flying && same(camera.pose.position, position);
+    if (!waits()) return true;
     const eyes = this.walker.eyes_below(position);
     if (!eyes) return false;
     const { up } = camera;
@@ -107,7 +109,7 @@ export class Walking {
       });
       const floor = fall + this.walker.eye_height;
       if (!(Math.abs(clear - floor) <= 2 * this.walker.step)) return false;
-      if (camera.mode !== 'walk' || !same(camera.pose.position, position)) return true;
+      if (!waits()) return true;
     }
     this.parts_.navigation.stand(eyes);
     return true;
