@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "render_core/math/look_at.h"
+#include "render_core/math/sphere.h"
 
 namespace catgs::first_sight {
 namespace {
@@ -21,18 +22,6 @@ constexpr std::size_t max_views = 32;
 // A camera stands in free space when the 27 cells around it would stop less than a fifth of the
 // light.
 constexpr float free_optical_depth = 0.2f;
-
-/// Unit vectors that are spread evenly over the sphere: a Fibonacci lattice.
-std::array<glm::vec3, directions> sphere() {
-  constexpr float golden_angle = 2.3999632f;
-  std::array<glm::vec3, directions> rays;
-  for (std::size_t d = 0; d < directions; ++d) {
-    const float y = static_cast<float>(2 * d + 1) / directions - 1.0f;
-    const float ring = std::sqrt(1.0f - y * y), angle = golden_angle * static_cast<float>(d);
-    rays[d] = {ring * std::cos(angle), y, ring * std::sin(angle)};
-  }
-  return rays;
-}
 
 /// The view from a point in all directions.
 struct Surroundings {
@@ -61,7 +50,7 @@ class Explorer {
   Bounds box_;
   glm::vec3 up_;
   float reach_;
-  std::array<glm::vec3, directions> rays_ = sphere();
+  std::array<glm::vec3, directions> rays_ = sphere_directions<directions>();
 };
 
 std::optional<Surroundings> Explorer::explore(const glm::vec3& point) const {

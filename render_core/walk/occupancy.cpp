@@ -93,6 +93,14 @@ void Occupancy::take(const std::vector<Share>& from, std::size_t& blocks_taken) 
   }
 }
 
+void Occupancy::add_solid(const glm::ivec2& column, float height) {
+  Shares shares;
+  const glm::vec3 position(glm::vec2(column) + 0.5f, height);
+  if (!share_of(position, solid, shares)) return;
+  for (std::size_t shard = 0; shard < Occupancy::shards; ++shard)
+    take(shares[shard], blocks_of_shard_[shard]);
+}
+
 /// Chunks of the part spread their Gaussians side by side. Then each shard, which has columns of
 /// its own, takes the shares in the order of the chunks.
 void Occupancy::add(const GaussianCloud& part, ThreadPool& pool,

@@ -43,6 +43,9 @@ class Occupancy {
   void add(
       const GaussianCloud& part, ThreadPool& pool, const std::function<void()>& progress = [] {});
 
+  /// Makes the cell of the column (east, north) at this height solid up to there. Cells.
+  void add_solid(const glm::ivec2& column, float height);
+
   struct Rect {
     glm::ivec2 min{0}, max{0};  // cells; `max` is beyond the last one
   };

@@ -35,8 +35,11 @@ class Surfaces {
   [[nodiscard]] bool open(std::size_t i) const { return open_[i] != 0; }
   /// The surface that one step from i in a direction leads to; `none` where none does.
   [[nodiscard]] std::uint32_t next(std::size_t i, int direction) const;
-  /// The runs of a column of the grid, from below.
+  /// The runs of a column of the grid, from below, and the surface of the first one.
   [[nodiscard]] std::span<const Run> runs_at(const glm::ivec2& column) const;
+  [[nodiscard]] std::size_t first_at(const glm::ivec2& column) const {
+    return static_cast<std::size_t>(runs_at(column).data() - runs_.data());
+  }
   /// Marks the open surfaces that are connected all around within the body's
   /// radius.
   [[nodiscard]] std::vector<char> with_room(ThreadPool& pool) const;

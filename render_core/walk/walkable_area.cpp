@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/walk/shiny_floors.h"
 #include "render_core/walk/storeys.h"
 #include "render_core/walk/surfaces.h"
 
@@ -63,7 +64,9 @@ glm::vec3 middle_of(const Surfaces& surfaces, std::uint32_t i) {
 /// The nearest component below `start` that is not small; its seed is `none` where there is none.
 Component component_below(const Surfaces& surfaces, std::vector<char> clear, const glm::vec3& start,
                           Turns& turns) {
-  constexpr std::size_t small = 20;  // times smaller than the largest
+  constexpr std::size_t small = 20;    // times smaller than the largest
+  constexpr std::size_t enough = 400;  // cells: a terrace, under which a lawn lies
+  const float below = Person::in_cells(1.5f);
   std::vector<Component> components;
   for (std::uint32_t i = 0; i < surfaces.count(); ++i) {
     if (!clear[i]) continue;
@@ -84,7 +87,9 @@ Component component_below(const Surfaces& surfaces, std::vector<char> clear, con
   for (const Component& c : components) largest = std::max(largest, c.size);
   Component best;
   for (const Component& c : components)
-    if (small * c.size >= largest && c.distance < best.distance) best = c;
+    if ((small * c.size >= largest || (c.size >= enough && c.distance <= below)) &&
+        c.distance < best.distance)
+      best = c;
   return best;
 }
 
@@ -223,19 +228,39 @@ class Collector {
   std::vector<Found> found_;
 };
 
+/// The surfaces of an occupancy, and the clear area below the start.
+struct Ground {
+  Ground(const Occupancy& occupancy, const Person& person, const glm::vec3& start, ThreadPool& pool,
+         const std::function<void()>& progress, Turns& turns)
+      : surfaces(occupancy, person, pool, progress),
+        clear(surfaces.with_room(pool)),
+        below(component_below(surfaces, clear, occupancy.grid().from_world(start), turns)) {}
+
+  [[nodiscard]] std::vector<std::uint32_t> reached(Turns& turns) const {
+    std::vector<char> among = clear;
+    return flood(surfaces, below.seed, among, turns);
+  }
+
+  Surfaces surfaces;
+  std::vector<char> clear;
+  Component below;
+};
+
 }  // namespace
 
-WalkMap find_walkable_area(const Occupancy& occupancy, const Person& person, const glm::vec3& start,
+WalkMap find_walkable_area(Occupancy& occupancy, const Person& person, const glm::vec3& start,
                            std::string_view name, ThreadPool& pool,
                            const std::function<void()>& progress) {
-  const Surfaces surfaces(occupancy, person, pool, progress);
-  const std::vector<char> clear = surfaces.with_room(pool);
   Turns turns(progress);
-  const Component below =
-      component_below(surfaces, clear, occupancy.grid().from_world(start), turns);
-  if (below.seed == Surfaces::none)
+  const auto search = [&] { return Ground(occupancy, person, start, pool, progress, turns); };
+  Ground ground = search();
+  if (ground.below.seed == Surfaces::none)
     throw InputError(name, "", "nobody can stand below its start",
                      "--eye-height has the scene's units; a sidecar can name another start or up");
+  if (add_shiny_floors(occupancy, ground.surfaces, person, ground.reached(turns),
+                       [&] { turns.next(); }) > 0)
+    ground = search();
+  const auto& [surfaces, clear, below] = ground;
   Collector collector(surfaces, person, turns);
   collector.take_area(below.seed, clear);
   collector.take_obstacles();

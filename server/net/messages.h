@@ -133,6 +133,7 @@ struct SceneFacts {
   float scale = 1.0f;
   glm::dvec3 origin{0.0};       // that all places on the wire are about, see scene_origin.h
   bool up_is_doubtful = false;  // see SceneHints
+  bool start_enclosed = false;
   SceneAbout about;
 };
 

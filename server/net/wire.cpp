@@ -52,6 +52,7 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   out.set_background_rgb(scene.about.background_rgb);
   out.set_metres_per_unit(scene.about.metres_per_unit);
   out.set_up_is_doubtful(scene.up_is_doubtful);
+  out.set_start_enclosed(scene.start_enclosed);
   if (scene.origin != glm::dvec3(0.0)) {
     auto& origin = *out.mutable_origin();
     origin.set_x(scene.origin.x);

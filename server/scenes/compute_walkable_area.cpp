@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -12,8 +13,8 @@
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/files/scene_by_parts.h"
 #include "render_core/walk/eye_height.h"
+#include "render_core/walk/inhabited_area.h"
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walkable_area.h"
 #include "server/scenes/derived_files.h"
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_ids.h"
@@ -63,11 +64,13 @@ auto known_of_scene(const Body& body) {
   }
 }
 
-float eye_height_of(const WalkableAreaSource& source, const GaussianCloud& sample,
-                    const glm::dvec3& origin) {
-  if (const auto height = walk::eye_height_of(sample, hints_of(source, origin))) return *height;
-  throw InputError(spec_of(source), "", "has no floor and ceiling that tell how large people are",
-                   "its sidecar can name metres_per_unit");
+std::vector<float> eye_heights_of(const WalkableAreaSource& source, const GaussianCloud& sample,
+                                  const glm::dvec3& origin) {
+  std::vector<float> heights = walk::eye_heights_of(sample, hints_of(source, origin));
+  if (heights.empty())
+    throw InputError(spec_of(source), "", "has no rooms that tell how large people are",
+                     "its sidecar can name metres_per_unit");
+  return heights;
 }
 
 }  // namespace
@@ -90,35 +93,44 @@ std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
                                   const std::function<void()>& progress) {
   constexpr std::size_t most_blocks = std::size_t{1} << 21;
   const auto pool = std::make_shared<ThreadPool>(threads);
-  std::optional<walk::Occupancy> occupancy;
-  glm::dvec3 origin(0.0);
-  glm::vec3 start;
-  const auto begin = [&](const GaussianCloud& sample) {
-    const float eye_height = eye_height_of(source, sample, origin);
-    start = glm::vec3(source.start - origin);
-    occupancy.emplace(walk::grid_around(start, source.up, eye_height), most_blocks);
-  };
-  const auto take = [&](const GaussianCloud& part) {
-    known_of_scene([&] { occupancy->add(part, *pool, progress); });
-  };
   const std::string spec = spec_of(source);
-  if (is_synthetic(spec)) {
-    begin({});  // it has a unit
-    synthesize_parts(spec, *pool, take);
-  } else {
-    const SceneByParts scene = open(source, pool, progress);
-    origin = scene.hints.origin;
-    known_of_scene([&] { begin(*scene.sample); });
-    scene.each(take);
+  std::optional<SceneByParts> scene;
+  if (!is_synthetic(spec)) scene = open(source, pool, progress);
+  const glm::dvec3 origin = scene ? scene->hints.origin : glm::dvec3(0.0);
+  const GaussianCloud nothing;  // a synthetic scene has a unit
+  const auto eye_heights = known_of_scene(
+      [&] { return eye_heights_of(source, scene ? *scene->sample : nothing, origin); });
+  bool is_read = true;
+  const auto add_scene = [&](walk::Occupancy& occupancy) {
+    const auto take = [&](const GaussianCloud& part) {
+      known_of_scene([&] { occupancy.add(part, *pool, progress); });
+    };
+    is_read = false;
+    if (scene)
+      scene->each(take);
+    else
+      synthesize_parts(spec, *pool, take);
+    is_read = true;
+  };
+  try {
+    walk::WalkMap map = walk::find_inhabited_area({.name = spec,
+                                                   .start = glm::vec3(source.start - origin),
+                                                   .up = source.up,
+                                                   .eye_heights = eye_heights,
+                                                   .add_scene = add_scene,
+                                                   .most_blocks = most_blocks,
+                                                   .progress = progress},
+                                                  *pool);
+    map.origin = origin;
+    return walk::pack(map);
+  } catch (const InputError& error) {
+    if (is_read) throw NoWalkableArea(error);
+    throw;
   }
-  walk::WalkMap map = known_of_scene(
-      [&] { return walk::find_walkable_area(*occupancy, {}, start, spec, *pool, progress); });
-  map.origin = origin;
-  return walk::pack(map);
 }
 
 std::string walkable_area_name(const WalkableAreaSource& source) {
-  constexpr int version = 2;  // of what is found in a scene
+  constexpr int version = 3;  // of what is found in a scene
   const SceneLocation& scene = source.scene;
   const std::string files = is_synthetic(spec_of(source)) ? "" : content_facts(scene);
   const std::string facts = fmt::format("{}\n{} {} {}\n{} {} {}\n{} {}", files, source.start.x,

@@ -31,10 +31,11 @@ struct NoWalkableArea : InputError {
 };
 
 /// The bytes of a .walk file of the scene, for people of 1.6 m. Where the scene has no unit, the
-/// room around the start tells their size. Takes up to 1.4 GB for cells and 0.5 GB for what is
-/// found, beside the scene: that is read part by part where its format allows it, and else as a
-/// whole, with 4 M Gaussians at most. `progress` is called often, by several threads at a time, and
-/// may throw to cancel. Throws NoWalkableArea, or InputError where the scene cannot be read.
+/// heights of rooms tell their size, and the scene is read up to three times. Takes up to 1.4 GB
+/// for cells and 0.5 GB for what is found, beside the scene: that is read part by part where its
+/// format allows it, and else as a whole, with 4 M Gaussians at most. `progress` is called often,
+/// by several threads at a time, and may throw to cancel. Throws NoWalkableArea, or InputError
+/// where the scene cannot be read.
 std::string compute_walkable_area(const WalkableAreaSource& source, int threads,
                                   const std::function<void()>& progress);
 

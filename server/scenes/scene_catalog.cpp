@@ -169,10 +169,10 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->facts.model = scene.cloud.model;
   entry->in_pages = tree != nullptr;
   entry->coarse = representation.most_gaussians > 0;
-  use_hints(scene.hints, scene.name, entry->facts);
+  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
+  use_hints(scene.hints, scene.name, entry->surface.get(), entry->facts);
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
-  entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
   if (location.format != nullptr) {
     entry->sidecar = location.hints.sidecar;
     const std::optional<std::string> text = sidecar_text(entry->sidecar);

@@ -3,13 +3,16 @@
 #include <string>
 
 #include "render_core/base/printable.h"
+#include "render_core/scene/analysis/enclosure.h"
 #include "render_core/scene/scene.h"
 #include "server/net/messages.h"
 
 namespace catgs {
 
 /// Takes over what is hinted. `name`: of the scene, which is its title where its author gives none.
-inline void use_hints(const SceneHints& hints, const std::string& name, SceneFacts& facts) {
+/// `surface`: the scene's; null: it is not known whether the start is enclosed.
+inline void use_hints(const SceneHints& hints, const std::string& name,
+                      const SurfacePoints* surface, SceneFacts& facts) {
   facts.title = hints.about.title.empty() ? printable(name) : hints.about.title;
   facts.up = hints.up;
   facts.start_pose = hints.start_pose;
@@ -20,6 +23,7 @@ inline void use_hints(const SceneHints& hints, const std::string& name, SceneFac
   facts.scale = hints.scale;
   facts.origin = hints.origin;
   facts.up_is_doubtful = hints.up_is_doubtful;
+  facts.start_enclosed = surface != nullptr && is_start_enclosed(*surface, hints);
   facts.about = hints.about;
 }
 

@@ -26,7 +26,7 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   SceneHints hints = hints_of(entry.facts);
   use_sidecar(sidecar, entry.sidecar.filename().string(), hints);
   auto scene = std::make_shared<SceneEntry>(entry);
-  use_hints(hints, entry.name, scene->facts);
+  use_hints(hints, entry.name, entry.surface.get(), scene->facts);
   scene->tours = ToursAnswers(tours_of(entry.sidecar, text, media_origins));
   scene->sidecar_tag = text ? etag_of(*text) : "";
   return scene;

@@ -15,7 +15,7 @@ Visit::Visit(const VisitPolicy& policy, VisitHost& host, TimePoint now)
       host_(host),
       life_(policy, now),
       last_said_(now),
-      picks_(4.0, 4.0, now),
+      picks_(32.0, 32.0, now),
       stream_(host, policy, flow_),
       frames_(policy, flow_),
       statistics_(now) {}

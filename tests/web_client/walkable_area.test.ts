@@ -6,6 +6,7 @@ import { no_axes } from '#client/camera/movement';
 import { WalkMapLoader } from '#client/walkable_area/walk_map_loader';
 import { plan_picture } from '#client/walkable_area/plan_picture';
 import { cells_of, px_of } from '#client/walkable_area/plan_view';
+import { door_ahead, metres_per_unit } from '#client/walk/door';
 import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
@@ -73,18 +74,26 @@ const is_clear = (on: WalkMap, point: Vec3): boolean => {
 describe('walking', () => {
   it('comes down to the ground, and looks about level', () => {
     const camera = walker([-1, 1, 9], [1, 0, -3]);
-    expect(camera.at_rest).toBe(false);
+    expect(camera.at_rest).toBe(true);
+    camera.stand(new MapWalker(map).eyes_below([-1, 1, 9])!, false);
     rest(camera);
     expect_vec(camera.pose.position, [-1, 1, eye_m], 1);
     expect(dot(rotate(camera.pose.orientation, [0, 0, 1]), up)).toBeGreaterThan(-0.4);
   });
 
-  it('comes to the nearest ground where there is none below', () => {
-    const camera = walker([-4, 1, 3], [1, 0, 0]);
+  it.each<[Vec3, number]>([
+    [[-4, 1, eye_m], 0],
+    [[-1, 1, 3], 0],
+    [[-1, 1, eye_m + 0.2], 0.25],
+    [[-1, 5, eye_m], 0.25],
+  ])('moves a visitor at %j by no more than a step, whatever they press', (position, most) => {
+    const camera = walker(position, [0, 0, 0]);
     rest(camera);
-    const { position } = camera.pose;
-    expect(is_clear(map, position)).toBe(true);
-    expect(length(sub(position, [-4, 1, eye_m]))).toBeLessThan(3.5);
+    expect(length(sub(camera.pose.position, position))).toBeLessThanOrEqual(most);
+    camera.jump({ ...camera.pose, position });
+    hold(camera, 1 / 60);
+    rest(camera);
+    expect(length(sub(camera.pose.position, position))).toBeLessThan(most + 0.1);
   });
 
   it('keeps eye height on stairs, without a jump', () => {
@@ -146,10 +155,31 @@ describe('walking', () => {
   it('finds the ground again after somebody else has moved the camera', () => {
     const camera = walker([-1, 1, eye_m], [1, 0, 0]);
     rest(camera);
-    camera.jump({ ...camera.pose, position: [9, 5, 6] });
+    camera.jump({ ...camera.pose, position: [9, 5, 4.5] });
     hold(camera, 0.1);
     rest(camera);
     expect(camera.pose.position[2]).toBeCloseTo(2.72 + eye_m, 1);
+  });
+});
+
+describe('a door before the author', () => {
+  it('has 2 m where eyes have 1.6 m, and stands on the floor', () => {
+    const position: Vec3 = [-1, 1, eye_m];
+    const orientation = look_at(position, [-1, 9, eye_m - 1], up);
+    const [left, above, , right] = door_ahead(map, { position, orientation, fov_y_rad: 1 })!;
+    expect_vec(sub(above!, left!), [0, 0, (2 / 1.6) * eye_m], 3);
+    expect_vec(sub(right!, left!), [(0.9 / 1.6) * eye_m, 0, 0], 3);
+    expect(left![2]).toBeCloseTo(0, 1);
+    expect(metres_per_unit({ ...map, cell: 0.2 })).toBeCloseTo(0.5, 2);
+  });
+
+  it('stands nowhere without a floor', () => {
+    const eye = {
+      position: [-90, 1, eye_m] as Vec3,
+      orientation: look_at([0, 0, 0], [1, 0, 0], up),
+      fov_y_rad: 1,
+    };
+    expect(door_ahead(map, eye)).toBeUndefined();
   });
 });
 

@@ -32,6 +32,7 @@ export function mount_viewer(
     ...parts,
     tour_shown: tours.shown,
     go_to_stop: (index) => tours.player.go_to(index),
+    set_scale,
   });
   worker.on('participants_moved', ({ positions }) => walkable_area.show_participants(positions));
   const shared_tour = new SharedTour(parts, new Pointing(parts));

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -16,9 +17,9 @@
 #include "render_core/tools/progress.h"
 #include "render_core/tools/scene_options.h"
 #include "render_core/walk/eye_height.h"
+#include "render_core/walk/inhabited_area.h"
 #include "render_core/walk/plan.h"
 #include "render_core/walk/walk_file.h"
-#include "render_core/walk/walkable_area.h"
 
 namespace catgs {
 namespace {
@@ -44,20 +45,19 @@ SceneByParts open_parts(const FloorsOptions& options, const std::shared_ptr<Thre
   return by_parts(load_scene(location, options.scene, options.threads, quiet));
 }
 
-float eye_height_of(const FloorsOptions& options, const SceneByParts& parts) {
+std::vector<float> eye_heights_of(const FloorsOptions& options, const SceneByParts& parts) {
   if (options.eye_height) {
     if (!(*options.eye_height > 0.0f && *options.eye_height <= 1e6f))
       throw InputError("--eye-height", "", fmt::format("{} is not a height", *options.eye_height),
                        "in the scene's units, over 0");
-    return *options.eye_height;
+    return {*options.eye_height};
   }
-  const auto height = walk::eye_height_of(*parts.sample, parts.hints);
-  if (!height)
-    throw InputError(options.scene.path, "",
-                     "has no floor and ceiling at its start that would tell how large a person is",
+  std::vector<float> heights = walk::eye_heights_of(*parts.sample, parts.hints);
+  if (heights.empty())
+    throw InputError(options.scene.path, "", "has no rooms that would tell how large a person is",
                      "give --eye-height in the scene's units: 1.6 where these are metres, or "
                      "metres_per_unit in its sidecar");
-  return *height;
+  return heights;
 }
 
 void print_map(const walk::WalkMap& map, std::uint64_t file_bytes) {
@@ -98,37 +98,43 @@ void floors(const FloorsOptions& options, bool quiet) {
   const auto pool = std::make_shared<ThreadPool>(options.threads);
   const auto begin = Clock::now();
   const SceneByParts parts = open_parts(options, pool, quiet);
-  const float eye_height = eye_height_of(options, parts);
-  const glm::vec3& start = parts.hints.start_pose.position;
-  walk::Occupancy occupancy(walk::grid_around(start, parts.hints.up, eye_height));
+  const std::vector<float> eye_heights = eye_heights_of(options, parts);
   const double opened_s = seconds_since(begin);
-  double adding_s = 0.0;
+  double reading_s = 0.0;
   std::uint64_t gaussians = 0;
-  parts.each([&](const GaussianCloud& part) {
-    const auto adds = Clock::now();
-    occupancy.add(part, *pool);
-    gaussians += part.size();
-    adding_s += seconds_since(adds);
-  });
-  const auto searches = Clock::now();
-  walk::WalkMap map = walk::find_walkable_area(occupancy, {}, start, options.scene.path, *pool);
+  std::size_t cell_bytes = 0;
+  const auto add_scene = [&](walk::Occupancy& occupancy) {
+    const auto reads = Clock::now();
+    gaussians = 0;
+    parts.each([&](const GaussianCloud& part) {
+      occupancy.add(part, *pool);
+      gaussians += part.size();
+    });
+    cell_bytes = occupancy.bytes();
+    reading_s += seconds_since(reads);
+  };
+  walk::WalkMap map = walk::find_inhabited_area({.name = options.scene.path,
+                                                 .start = parts.hints.start_pose.position,
+                                                 .up = parts.hints.up,
+                                                 .eye_heights = eye_heights,
+                                                 .add_scene = add_scene},
+                                                *pool);
   map.origin = parts.hints.origin;
-  const double search_s = seconds_since(searches);
+  const double search_s = seconds_since(begin) - opened_s - reading_s;
   walk::write_walk_file(map, options.out);
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   fmt::print("{}: {} Gaussians, eye height {:.4g}{}, cells of {:.4g}\n", options.out, gaussians,
-             eye_height,
+             map.grid.cell * walk::cells_per_eye_height,
              options.eye_height                         ? ""
              : parts.hints.about.metres_per_unit > 0.0f ? " (1.6 m)"
                                                         : " (estimated)",
-             occupancy.grid().cell);
+             map.grid.cell);
   print_map(map, std::filesystem::file_size(options.out));
   fmt::print(
-      "opened in {:.1f} s, occupancy {:.1f} s of {:.1f} s with reading, ground {:.1f} s; "
+      "opened in {:.1f} s, occupancy {:.1f} s with reading, ground {:.1f} s; "
       "cells {:.0f} MB, peak memory {:.0f} MB\n",
-      opened_s, adding_s, seconds_since(begin) - opened_s - search_s, search_s,
-      1e-6 * static_cast<double>(occupancy.bytes()),
+      opened_s, reading_s, search_s, 1e-6 * static_cast<double>(cell_bytes),
       1e-3 * static_cast<double>(usage.ru_maxrss) * 1.024);
   if (!options.plan.empty()) write_plans(map, options.plan);
 }

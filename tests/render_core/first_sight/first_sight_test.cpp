@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include "render_core/scene/analysis/enclosure.h"
 #include "render_core/scene/analysis/up_axis.h"
 #include "render_core/scene/analysis/voxel_grid.h"
 #include "render_core/scene/copy_gaussians.h"
@@ -187,6 +188,22 @@ TEST(FirstSight, AnyCloudHasAView) {
     EXPECT_GT(hints.near_z, 0.0f) << k;
     EXPECT_GT(hints.scale, 0.0f) << k;
   }
+}
+
+TEST(FirstSight, RoomsEncloseTheStartAndObjectsDoNot) {
+  ThreadPool pool(2);
+  const auto is_enclosed = [&](const GaussianCloud& cloud, SceneHints hints) {
+    return is_start_enclosed(SurfacePoints(cloud, pool), hints);
+  };
+  EXPECT_TRUE(is_enclosed(hall(100000), estimate(hall(100000))));
+  EXPECT_TRUE(is_enclosed(flat(100000), estimate(flat(100000), up_z)));
+  EXPECT_FALSE(is_enclosed(ball(1.0f), estimate(ball(1.0f))));
+  EXPECT_FALSE(is_enclosed({}, SceneHints{}));
+  // The author leads visitors around a thing in the middle of the hall.
+  SceneHints hints = estimate(hall(100000));
+  hints.focus = {0.0f, -1.6f, 0.0f};
+  hints.start_pose.position = {1.5f, -1.6f, 0.0f};
+  EXPECT_FALSE(is_enclosed(hall(100000), hints));
 }
 
 /// Rays of a thin layer 10^9 units away, where no step of a cell's size changes a coordinate.

@@ -6,6 +6,8 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/portable.h"
+#include "render_core/walk/eye_height.h"
+#include "render_core/walk/inhabited_area.h"
 #include "render_core/walk/walk_file.h"
 #include "tests/render_core/walk/worlds.h"
 #include "tests/support/walker.h"
@@ -107,6 +109,54 @@ TEST(WalkableArea, ARandomWalkPassesTheDoorAndNoWall) {
     }
   }
   EXPECT_GT(crossings, 1);
+}
+
+TEST(WalkableArea, ShinyFloorIsFloor) {
+  const WalkMap map = test::map_of(test::shiny_room(), {2, 3, 1.6f});
+  std::size_t clear = 0;
+  for (const Position& position : map.positions) clear += position.kind == Kind::clear ? 1 : 0;
+  EXPECT_GT(clear, 3800u) << "of 48 square metres";
+  const Stand beyond = stand_at(map, {6, 3, 1.6f});
+  EXPECT_NEAR(eyes_of(map, beyond).z, 1.6f, 0.1f);
+  EXPECT_FALSE(find_path(map, stand_at(map, {2, 3, 1.6f}), beyond).empty());
+}
+
+TEST(WalkableArea, ATerraceIsLeftOverNoRailing) {
+  ThreadPool pool(2);
+  const GaussianCloud cloud = test::villa();
+  SceneHints hints;
+  hints.up = {0, 0, 1};
+  hints.start_pose.position = test::terrace_start;
+  const std::vector<float> heights = eye_heights_of(cloud, hints);
+  const WalkMap map =
+      find_inhabited_area({.name = "villa",
+                           .start = hints.start_pose.position,
+                           .up = hints.up,
+                           .eye_heights = heights,
+                           .add_scene = [&](Occupancy& occupancy) { occupancy.add(cloud, pool); }},
+                          pool);
+  EXPECT_NEAR(map.grid.cell * cells_per_eye_height, 1.6f, 0.3f);
+  EXPECT_NEAR(eyes_of(map, map.start).z, 2.9f + 1.6f, 0.4f);
+  EXPECT_TRUE(stand_below(map, {4, 3, 4.5f})) << "through the door";
+  EXPECT_FALSE(stand_below(map, {-8, 3, 4.5f})) << "the lawn";
+}
+
+TEST(WalkableArea, TheHeightWhoseAreaIsInhabitedWins) {
+  ThreadPool pool(2);
+  const GaussianCloud cloud = test::room(0.9f);
+  const auto eye_height = [&](std::vector<float> heights, const glm::vec3& start) {
+    const WalkMap map = find_inhabited_area(
+        {.name = "room",
+         .start = start,
+         .up = {0, 0, 1},
+         .eye_heights = heights,
+         .add_scene = [&](Occupancy& occupancy) { occupancy.add(cloud, pool); }},
+        pool);
+    return map.grid.cell * cells_per_eye_height;
+  };
+  EXPECT_FLOAT_EQ(eye_height({3.1f, 0.4f, 1.6f}, {2, 2, 1.5f}), 1.6f);
+  EXPECT_FLOAT_EQ(eye_height({1.6f, 1.2f}, {2, 2, 5.0f}), 1.6f) << "none is inhabited";
+  EXPECT_THROW(eye_height({3.1f, 9.0f}, {2, 2, 1.5f}), InputError);
 }
 
 TEST(WalkableArea, SteepSlopesAreNotWalkable) {

@@ -7,6 +7,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/base/portable.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/walk/occupancy.h"
@@ -63,6 +64,47 @@ inline GaussianCloud stairs() {
     add_plate(cloud, {x, 0, z + 0.17f}, {0.28f, 0, 0}, {0, 1.5f, 0});
   }
   add_plate(cloud, {6.48f, 0, 2.72f}, {3.52f, 0, 0}, {0, 6, 0});
+  return cloud;
+}
+
+/// A storey on stilts, 8 x 6 m, with its floor at z = 2.9 and a room of 2.6 m. A terrace of 2.5 m
+/// with a railing lies before its glass front at x = 0, below eaves. A lawn of 40 x 40 m is all
+/// around.
+inline GaussianCloud villa() {
+  GaussianCloud cloud;
+  const float floor = 2.9f, top = 5.5f;
+  add_plate(cloud, {-20, -17, 0}, {40, 0, 0}, {0, 40, 0});
+  add_plate(cloud, {-2.5f, 0, floor}, {10.5f, 0, 0}, {0, 6, 0});
+  add_plate(cloud, {-2.5f, 0, top}, {10.5f, 0, 0}, {0, 6, 0});
+  for (const float y : {0.0f, 6.0f}) add_plate(cloud, {0, y, floor}, {8, 0, 0}, {0, 0, 2.6f});
+  add_plate(cloud, {8, 0, floor}, {0, 6, 0}, {0, 0, 2.6f});
+  add_plate(cloud, {0, 0, floor}, {0, 2, 0}, {0, 0, 2.6f});
+  add_plate(cloud, {0, 3, floor}, {0, 3, 0}, {0, 0, 2.6f});
+  add_plate(cloud, {-2.5f, 0, floor}, {0, 6, 0}, {0, 0, 1});
+  for (const float y : {0.0f, 6.0f}) add_plate(cloud, {-2.5f, y, floor}, {2.5f, 0, 0}, {0, 0, 1});
+  return cloud;
+}
+inline constexpr glm::vec3 terrace_start(-2.1f, 3, 4.5f);
+
+/// A room as room() without its wall and its table, whose floor shines from x = 3 on: light comes
+/// from what is mirrored, faint and deep below.
+inline GaussianCloud shiny_room() {
+  GaussianCloud cloud;
+  const float top = 2.6f;
+  add_plate(cloud, {0, 0, 0}, {3, 0, 0}, {0, 6, 0});
+  add_plate(cloud, {0, 0, top}, {8, 0, 0}, {0, 6, 0});
+  for (const float y : {0.0f, 6.0f}) add_plate(cloud, {0, y, 0}, {8, 0, 0}, {0, 0, top});
+  for (const float x : {0.0f, 8.0f}) add_plate(cloud, {x, 0, 0}, {0, 6, 0}, {0, 0, top});
+  SplitMix64 random(3);
+  const auto share = [&] { return static_cast<float>(random.next() >> 40) * 0x1p-24f; };
+  for (int k = 0; k < 20000; ++k) {
+    const glm::vec3 at(3.0f + 5.0f * share(), 6.0f * share(), -1.0f - 3.0f * share());
+    cloud.mean.push_back(at);
+    cloud.rotation.emplace_back(1.0f, 0.0f, 0.0f, 0.0f);
+    cloud.scale.emplace_back(0.1f, 0.1f, 0.02f);
+    cloud.opacity.push_back(0.5f);
+    cloud.sh.emplace_back(0.0f);
+  }
   return cloud;
 }
 

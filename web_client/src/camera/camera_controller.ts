@@ -13,6 +13,7 @@ import {
   type Vec3,
 } from '../base/vector';
 import { CameraRig, default_fov_y_rad } from './camera_rig';
+import { ClearWay, type AskDistance } from './clear_way';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
 import { FlyController } from './fly_controller';
@@ -33,8 +34,9 @@ const level_time_s = 0.25;
 export class CameraController {
   private readonly rig_ = new CameraRig();
   private readonly walk_ = new WalkController(this.rig_);
+  private readonly clear_way_ = new ClearWay();
   private readonly modes_: Readonly<Record<CameraMode, ModeController>> = {
-    orbit: new OrbitController(this.rig_),
+    orbit: new OrbitController(this.rig_, this.clear_way_),
     fly: new FlyController(this.rig_),
     walk: this.walk_,
   };
@@ -97,6 +99,11 @@ export class CameraController {
     this.rig_.fov_y_rad = value;
   }
 
+  /** Who says how far an orbiting camera may go; undefined: anywhere. */
+  set asks_distance(ask: AskDistance | undefined) {
+    this.clear_way_.ask = ask;
+  }
+
   /** Who walks on the walkable area; undefined: it is not known, or there is none. */
   set walker(walker: Walker | undefined) {
     this.walk_.walker = walker;
@@ -106,6 +113,7 @@ export class CameraController {
     this.end_flight(false);
     this.scene_ = scene;
     this.rig_.load(scene);
+    this.clear_way_.forget();
     this.smoothing_.clear();
   }
 
@@ -176,18 +184,13 @@ export class CameraController {
   set_mode(mode: CameraMode, at_once = false): void {
     if (mode === this.mode_) return;
     this.mode_ = mode;
-    this.begin_mode(at_once);
+    const to = this.controller.begin();
+    if (to) this.look_from(to, at_once);
   }
 
-  /** Flies to where the mode begins, if that is elsewhere. */
-  begin_mode(at_once = false): void {
-    const to = this.controller.begin();
-    if (to)
-      this.fly_to(
-        to,
-        add(to.position, scale(rotate(to.orientation, forward), this.rig_.distance())),
-        at_once,
-      );
+  /** A walker comes to stand where the eyes are here. */
+  stand(eyes: Vec3, at_once: boolean): void {
+    this.look_from(this.walk_.standing(eyes), at_once);
   }
 
   /** Turns the scene in the picture, for captures that lie on their side or stand on their head. */
@@ -267,6 +270,11 @@ export class CameraController {
 
   private get controller(): ModeController {
     return this.modes_[this.mode_];
+  }
+
+  private look_from(to: Eye, at_once: boolean): void {
+    const ahead = scale(rotate(to.orientation, forward), this.rig_.distance());
+    this.fly_to(to, add(to.position, ahead), at_once);
   }
 
   /** The scene keeps this up, and its start is upright in it. */

@@ -36,6 +36,8 @@ export class CameraRig {
   nearest = 0.1;
   /** The camera may leave the scene's limits, to look at it from outside. */
   unlimited = false;
+  /** Visits begin inside. */
+  enclosed = false;
   private fov_y_rad_ = default_fov_y_rad;
   private min_: Vec3 = [0, 0, 0];
   private max_: Vec3 = [0, 0, 0];
@@ -68,6 +70,7 @@ export class CameraRig {
     this.min_ = unlimited ? scale(nowhere, -1) : min(scene.limits_min, start.position);
     this.max_ = unlimited ? nowhere : max(scene.limits_max, start.position);
     this.unlimited = false;
+    this.enclosed = scene.enclosed ?? false;
   }
 
   /** From the eye to the focus; the scene's scale where the focus is too near to pan by. */
@@ -78,7 +81,12 @@ export class CameraRig {
 
   /** Moves the focus to the middle of the view, at the same distance. */
   refocus(): void {
-    this.focus = this.ahead(this.distance());
+    this.look_ahead(this.distance());
+  }
+
+  /** Moves the focus to the middle of the view. */
+  look_ahead(distance: number): void {
+    this.focus = this.ahead(distance);
   }
 
   within(position: Vec3): Vec3 {

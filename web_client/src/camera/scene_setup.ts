@@ -14,4 +14,6 @@ export interface SceneSetup {
   /** To a visitor; 0: unknown, and judged by the start. */
   readonly scale: number;
   readonly start_fov_y_rad?: number;
+  /** Walls are around the start: circling the focus would lead through them. */
+  readonly enclosed?: boolean;
 }

@@ -38,11 +38,15 @@ export class WalkController extends FlyController {
     return normalize(this.rig.level_part(view), view);
   }
 
-  /** Comes down to the floor, and looks about level. */
+  /** Comes to the floor, if that is no more than a step away. */
   override begin(): Eye | undefined {
+    const eyes = this.walker_?.stand_near(this.rig.pose.position);
+    return eyes && this.standing(eyes);
+  }
+
+  /** With the eyes there, and the view about level. */
+  standing(position: Vec3): Eye {
     const { rig } = this;
-    const position = this.walker_?.stand_near(rig.pose.position);
-    if (!position) return undefined;
     const rise = Math.min(Math.max(dot(rig.view, rig.up), -steepest_sine), steepest_sine);
     const ahead = add(scale(this.heading, Math.sqrt(1 - rise * rise)), scale(rig.up, rise));
     return {

@@ -53,6 +53,7 @@ export class Navigation {
   private scene_id_: string | undefined;
   private overscan_ = { x: 1, y: 1 };
   private pointed_ = 0;
+  private default_mode_: 'no' | 'any' | 'look' = 'any'; // 'no': somebody has chosen the mode
 
   constructor(
     private readonly view_: HTMLElement,
@@ -66,6 +67,11 @@ export class Navigation {
       this.camera.smoothing_s = 0;
       this.inertia_.enabled = false;
     }
+    this.camera.asks_distance = async (ray) => {
+      const distance = await this.distance_along(ray);
+      this.loop.wake();
+      return distance;
+    };
     this.up_changed.listen(() => this.chosen_ups_.set(this.scene_id, this.camera.up));
     const { axes, is_touched } = this.bind_input();
     this.loop = new CameraLoop(this.camera, axes, is_touched, this.inertia_, clock, (sample) => {
@@ -189,18 +195,36 @@ export class Navigation {
     this.moved();
   }
 
+  /** The visit began inside by looking around, and goes on by walking where that is possible. */
+  get looks_by_default(): boolean {
+    return this.default_mode_ === 'look';
+  }
+
   set_mode(mode: CameraMode): void {
+    this.default_mode_ = 'no';
     this.camera.set_mode(mode, this.reduced_motion_);
     this.loop.wake();
     this.changed.emit();
   }
 
-  /** Who walks from now on. `comes_down`: a camera that walks already comes down to the floor, if nothing leads it. */
-  set_walker(walker: Walker, comes_down: boolean): void {
+  /** Who walks from now on. The camera stays where it is. */
+  set_walker(walker: Walker): void {
+    if (this.looks_by_default && walker.stand_near(this.eye.position)) {
+      this.set_mode('walk');
+      this.default_mode_ = 'any';
+    }
     this.camera.walker = walker;
-    if (!comes_down || this.camera.mode !== 'walk' || this.camera.is_flying) return;
-    this.camera.begin_mode(this.reduced_motion_);
+  }
+
+  /** A walking visitor comes to stand where their eyes are here. */
+  stand(eyes: Vec3): void {
+    this.camera.stand(eyes, this.reduced_motion_);
     this.loop.wake();
+  }
+
+  /** How far away what the ray meets is, world units; Infinity: nothing, or no answer comes. */
+  async distance_along(ray: Ray): Promise<number> {
+    return (await this.picks_.hit(ray))?.distance ?? Infinity;
   }
 
   next_mode(): void {
@@ -290,10 +314,18 @@ export class Navigation {
       this.camera.set_up(up);
       this.camera.reset();
     }
-    const mode = start_mode(scene);
-    if (mode) this.set_mode(mode);
+    this.begin_in_mode(start_mode(scene), scene.startEnclosed);
     this.loop.enable();
     this.entered.emit({ scene, scene_ids: sceneIds });
+  }
+
+  /** `said`: by the scene. Otherwise, who has chosen no mode, or circles, begins inside by turning on the spot. */
+  private begin_in_mode(said: CameraMode | undefined, enclosed: boolean): void {
+    const { default_mode_: is_default, camera } = this;
+    const free = is_default !== 'no' || (enclosed && camera.mode === 'orbit');
+    const usual = enclosed ? 'fly' : 'orbit';
+    this.set_mode(said ?? (free ? usual : camera.mode));
+    if (free) this.default_mode_ = enclosed && !said ? 'look' : 'any';
   }
 
   /** Turns the camera to what is there, unless the visitor pointed elsewhere meanwhile. */

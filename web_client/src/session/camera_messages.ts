@@ -103,6 +103,7 @@ export function scene_setup(scene: SceneFacts): SceneSetup {
     limits_max: position_of(scene.limitsMax),
     near_z: scene.nearZ,
     scale: scene.scale,
+    enclosed: scene.startEnclosed,
   };
 }
 

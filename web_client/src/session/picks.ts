@@ -2,7 +2,7 @@ import type { Timers } from '../base/clock';
 import { add, scale, type Vec3 } from '../base/vector';
 import type { Ray } from '../camera/ray';
 
-const patience_ms = 2000; // the server answers only a few a second
+const patience_ms = 2000; // the server does not answer more than some a second
 
 /** What a ray meets: how far away it is, and how deep the surface is there. World units. */
 export interface Hit {

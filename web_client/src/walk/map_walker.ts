@@ -1,14 +1,14 @@
 // A visitor who walks on a WalkMap.
-import { dot, scale, add, type Vec3 } from '../base/vector';
+import { dot, scale, add, sub, type Vec3 } from '../base/vector';
 import type { Walker } from '../camera/walker';
 import { height_of } from './tiles';
 import { cells_per_eye_height, clear_at, eyes_of, type Stand, type WalkMap } from './walk_map';
 import { move, stand_below } from './walker';
 
-const farthest_cells = 96;
+const nearby_cells = 96;
 
 /** The clear ground nearest to a column, below `point`; undefined where none is near. World units. */
-function stand_around(map: WalkMap, point: Vec3): Stand | undefined {
+function stand_around(map: WalkMap, point: Vec3, farthest_cells: number): Stand | undefined {
   const here = stand_below(map, point);
   if (here) return here;
   const [east, north] = map.axes;
@@ -56,21 +56,32 @@ export function clear_near(map: WalkMap, stand: Stand, most_cells = 8): Stand | 
 
 export class MapWalker implements Walker {
   readonly eye_height: number;
+  /** The highest step up or down, world units. */
+  readonly step: number;
   private stand_: Stand;
 
   constructor(readonly map: WalkMap) {
     this.eye_height = cells_per_eye_height * map.cell;
+    this.step = map.step * map.cell;
     this.stand_ = map.start;
   }
 
-  stand_near(position: Vec3): Vec3 {
-    this.stand_ = this.stand_at(position);
-    return eyes_of(this.map, this.stand_);
+  stand_near(position: Vec3): Vec3 | undefined {
+    const eyes = this.eyes_below(position);
+    const rise = eyes && dot(sub(eyes, position), this.map.axes[2]);
+    return rise !== undefined && Math.abs(rise) <= this.step ? eyes : undefined;
+  }
+
+  /** Comes to stand at most a step beside, however far below, and returns where the eyes are then. */
+  eyes_below(position: Vec3): Vec3 | undefined {
+    const stand = stand_around(this.map, position, Math.floor(this.map.step));
+    if (stand) this.stand_ = stand;
+    return stand && eyes_of(this.map, stand);
   }
 
   /** Where somebody would stand whose eyes are here: below, or nearby; else at the start of the map. */
   stand_at(position: Vec3): Stand {
-    return stand_around(this.map, position) ?? this.map.start;
+    return stand_around(this.map, position, nearby_cells) ?? this.map.start;
   }
 
   walk(movement: Vec3): Vec3 {

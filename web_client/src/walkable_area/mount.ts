@@ -11,6 +11,7 @@ import { text } from '../text/text';
 import type { TourState } from '../tour/player';
 import type { Stand, WalkMap } from '../walk/walk_map';
 import type { Dollhouse } from './dollhouse';
+import type { DoorQuestion } from './door_question';
 import type { PlanPanel } from './plan_panel';
 import { WalkMapLoader } from './walk_map_loader';
 import type { Walking } from './walking';
@@ -18,6 +19,8 @@ import type { Walking } from './walking';
 interface WalkableAreaParts extends PageParts {
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
+  /** Of authors. */
+  readonly set_scale: ((metres_per_unit: number) => void) | undefined;
 }
 
 const warn = (error: unknown): void => console.warn('the walkable area cannot be used', error); // the server is away
@@ -31,6 +34,8 @@ export class WalkableArea {
   private walking_: Walking | undefined;
   private plan_: PlanPanel | undefined;
   private house_: Dollhouse | undefined;
+  private door_: DoorQuestion | undefined;
+  private has_scale_ = true;
   private tour_: TourState | undefined;
   private eye_: Eye;
   private participants_: readonly Vec3[] = [];
@@ -41,7 +46,10 @@ export class WalkableArea {
     const { navigation, worker, toolbar, seen, token, notice, tour_shown } = parts_;
     this.loader_ = new WalkMapLoader(token);
     this.eye_ = navigation.eye;
-    navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
+    navigation.entered.listen(({ scene }) => {
+      this.has_scale_ = scene.metresPerUnit > 0;
+      this.enter(scene.sceneId);
+    });
     navigation.went_back.listen(() => this.house_?.close());
     navigation.taken_over.listen(() => this.walking_?.stay());
     navigation.led_away.listen(() => {
@@ -65,6 +73,7 @@ export class WalkableArea {
       this.eye_ = eye;
       this.walking_?.move(eye);
       this.plan_?.move(eye);
+      this.door_?.move(eye);
     });
     navigation.changed.listen(() => this.walking_?.draw());
     tour_shown.listen((state) => {
@@ -78,8 +87,9 @@ export class WalkableArea {
       this.button_.hidden = !map;
       if (map === 'large') return;
       this.map_ = map;
-      if (navigation.camera.mode === 'walk') this.walk();
+      if (navigation.camera.mode === 'walk' || navigation.looks_by_default) this.walk();
       if (!this.panel_.hidden) this.open_plan().catch(warn);
+      if (map) this.ask_scale(map).catch(warn);
     });
   }
 
@@ -93,6 +103,7 @@ export class WalkableArea {
     this.loader_.enter(scene_id);
     this.house_?.close();
     this.house_ = undefined;
+    this.door_?.ask(undefined);
     this.map_ = undefined;
     this.walking_?.end();
     this.walking_ = this.plan_ = undefined;
@@ -112,8 +123,15 @@ export class WalkableArea {
 
   private walk(): void {
     const { map_: map } = this;
-    if (map) this.make_walking(map).catch(warn);
+    if (map) this.begin_walking(map).catch(warn);
     else void this.loader_.want();
+  }
+
+  /** Where the scene or a link begins with walking, visitors first see what its author has chosen. */
+  private async begin_walking(map: WalkMap): Promise<void> {
+    const walking = await this.make_walking(map);
+    if (!walking || !this.chose_walk_ || (await walking.come_down())) return;
+    this.parts_.notice.show(text.floor_plan.no_floor, 10);
   }
 
   private async make_walking(map: WalkMap): Promise<Walking | undefined> {
@@ -128,9 +146,18 @@ export class WalkableArea {
       },
       map,
     );
-    // Where the scene or a link begins with walking, visitors first see what its author has chosen.
-    navigation.set_walker(this.walking_.walker, this.chose_walk_);
+    navigation.set_walker(this.walking_.walker);
     return this.walking_;
+  }
+
+  private async ask_scale(map: WalkMap): Promise<void> {
+    const { set_scale } = this.parts_;
+    if (!set_scale || this.has_scale_) return;
+    const { DoorQuestion } = await import('./door_question');
+    if (map !== this.map_) return;
+    this.door_ ??= new DoorQuestion({ ...this.parts_, set_scale });
+    this.door_.ask(map);
+    this.door_.move(this.eye_);
   }
 
   private async open_plan(): Promise<void> {

@@ -8,6 +8,7 @@ import {
   look_at,
   normalize,
   rotate,
+  same,
   scale,
   sub,
   type Vec3,
@@ -68,6 +69,7 @@ export class Walking {
     this.walker = new MapWalker(map);
     this.eye_ = navigation.eye;
     this.picture_.id = 'floor-ring';
+    this.picture_.setAttribute('class', 'on-floor');
     this.picture_.setAttribute('aria-hidden', 'true');
     this.picture_.append(this.ring_);
     view.append(this.picture_);
@@ -86,11 +88,38 @@ export class Walking {
     this.picture_.remove();
   }
 
-  /** Walks there, or flies where the visitor does not walk. */
+  /**
+   * A visitor who has chosen to walk comes to the floor below, unless something is in between. False: there is none
+   * within a step beside.
+   */
+  async come_down(): Promise<boolean> {
+    const { camera } = this.parts_.navigation;
+    const { position } = camera.pose;
+    const waits = (): boolean =>
+      camera.mode === 'walk' && !camera.is_flying && same(camera.pose.position, position);
+    if (!waits()) return true;
+    const eyes = this.walker.eyes_below(position);
+    if (!eyes) return false;
+    const { up } = camera;
+    const fall = dot(sub(position, eyes), up);
+    if (Math.abs(fall) > this.walker.step) {
+      const clear = await this.parts_.navigation.distance_along({
+        origin: position,
+        direction: scale(up, -1),
+      });
+      const floor = fall + this.walker.eye_height;
+      if (!(Math.abs(clear - floor) <= 2 * this.walker.step)) return false;
+      if (!waits()) return true;
+    }
+    this.parts_.navigation.stand(eyes);
+    return true;
+  }
+
+  /** Walks there, or flies where the visitor does not stand. */
   async go_to(to: Stand): Promise<void> {
     const { navigation, reduced_motion } = this.parts_;
     const eye = navigation.eye;
-    if (navigation.camera.mode !== 'walk') {
+    if (navigation.camera.mode !== 'walk' || !this.walker.stand_near(eye.position)) {
       const position = eyes_of(this.map, to);
       const duration_s = reduced_motion
         ? 0

@@ -1,0 +1,112 @@
+// Where an orbiting camera may go: rays that were asked of the server say how far the way is clear. Pure.
+import { add, dot, forward, length, normalize, scale, sub, type Vec3 } from '../base/vector';
+import type { Ray } from './ray';
+
+/** Asks how far away the surface is that a ray meets, world units; Infinity: it meets none. */
+export type AskDistance = (ray: Ray) => Promise<number>;
+
+const most_known = 16;
+const asked_again = 0.75; // of what was asked: then the rest follows
+
+/** A way that the camera wants to go. World units. */
+export interface WantedWay {
+  readonly from: Vec3;
+  readonly to: Vec3;
+  /** From `from` on: what is asked at once. */
+  readonly ahead: Vec3;
+  /** What is so near to a ray is as clear as the ray. */
+  readonly width: number;
+}
+
+interface KnownWay extends Ray {
+  readonly clear: number; // world units
+  readonly asked: number; // likewise: as far as the camera was to go
+  readonly width: number;
+}
+
+export class ClearWay {
+  ask: AskDistance | undefined;
+  private known_: KnownWay[] = [];
+  private asks_ = false;
+  private checked_: Vec3 | undefined; // the camera may be here
+  private ventured_: Vec3 | undefined; // the camera went here before the answer
+  private end_: Vec3 | undefined;
+
+  /** The scene is another one. */
+  forget(): void {
+    this.known_ = [];
+    this.checked_ = this.ventured_ = this.end_ = undefined;
+  }
+
+  /** Whether the camera may go there; undefined: it is not known yet, and is asked. */
+  allows(want: WantedWay): boolean | undefined {
+    const { ask } = this;
+    if (!ask) return true;
+    let blocked = false;
+    for (const way of this.known_) {
+      const width = Math.min(want.width, way.width);
+      const along = along_of(way, want.to, width);
+      if (along === undefined) continue;
+      if (along <= way.clear - width) {
+        if (along > asked_again * way.asked) this.ask_along(ask, want);
+        return true;
+      }
+      const before = along_of(way, want.from, width);
+      blocked ||= before !== undefined && before < along && before <= way.clear + width;
+    }
+    if (blocked) return false;
+    this.ask_along(ask, want);
+    return undefined;
+  }
+
+  /** The camera has gone there without an answer. */
+  ventured(to: Vec3): void {
+    this.ventured_ = to;
+  }
+
+  /** Where the camera goes back to, since something opaque is in between; undefined: nothing is. */
+  take_back(): Vec3 | undefined {
+    const end = this.end_;
+    this.end_ = undefined;
+    return end;
+  }
+
+  /** Asks what is ahead, and whether anything opaque lies between here and where it was asked last. */
+  private ask_along(ask: AskDistance, { from, ahead, width }: WantedWay): void {
+    if (this.asks_) return;
+    this.asks_ = true;
+    const { known_: known, checked_: checked } = this;
+    const direction = normalize(ahead, forward);
+    const come = checked ? sub(from, checked) : ahead;
+    const is_near = checked && length(come) > 0 && length(come) <= 2 * length(ahead);
+    const answered = (clear: number, come_clear: number): void => {
+      this.asks_ = false;
+      if (known !== this.known_) return; // of another scene
+      const passes = !is_near || come_clear >= length(come);
+      this.checked_ = passes ? from : checked;
+      if (!passes) this.end_ = checked;
+      if (!passes) return;
+      known.unshift({ origin: from, direction, clear, asked: length(ahead), width });
+      known.splice(most_known);
+      const along = this.ventured_ && dot(sub(this.ventured_, from), direction);
+      this.ventured_ = undefined;
+      if (along !== undefined && along > clear - width)
+        this.end_ = add(from, scale(direction, Math.max(0, clear - width)));
+    };
+    const anywhere = (): number => Infinity;
+    void Promise.all([
+      ask({ origin: from, direction }).catch(anywhere),
+      checked && is_near
+        ? ask({ origin: checked, direction: normalize(come, forward) }).catch(anywhere)
+        : Infinity,
+    ]).then(([clear, come_clear]) => answered(clear, come_clear));
+  }
+}
+
+/** How far along the way a point is; undefined: beside it. */
+function along_of({ origin, direction }: KnownWay, point: Vec3, width: number): number | undefined {
+  const offset = sub(point, origin);
+  const along = dot(offset, direction);
+  const beside = length(sub(offset, scale(direction, along)));
+  return along >= -width && beside <= width ? along : undefined;
+}
