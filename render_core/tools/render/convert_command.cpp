@@ -135,17 +135,17 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
                      : "was not written, since it would be the input's, too");
     return;
   }
-  nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
+  nlohmann::ordered_json page_fields = page_fields_in_sidecar(conversion.in.hints);
   const SceneHints written = hints_of_output(hints, conversion, done);
   Placement placement = conversion.edit.placement;
   if (!keeps_origin(conversion.options.out)) placement.offset -= done.origin;
-  if (placement.moves()) place_tours(tours, placement, written.origin);
-  write_sidecar(written, sidecar, &tours);
+  if (placement.moves()) place_tours(page_fields, placement, written.origin);
+  write_sidecar(written, sidecar, &page_fields);
   fmt::print("{}: first view, {}{}\n", sidecar.string(), hints.source == "estimated" ? "" : "from ",
              hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
-  if (!tours.is_null()) copy_media(conversion.in.hints.sidecar, sidecar);
+  if (page_fields.contains("tours")) copy_media(conversion.in.hints.sidecar, sidecar);
 }
 
 /// Before the scene is loaded, which may take minutes.
