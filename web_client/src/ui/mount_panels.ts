@@ -1,6 +1,7 @@
 import type { PageParts } from '../page/parts';
 import { factor } from '../text/number';
 import { text } from '../text/text';
+import type { MeasureList } from '../tour/measure_list';
 import { MeasurePanel } from './measure_panel';
 import { QualityPanel } from './quality_panel';
 import { StatsPanel } from './stats_panel';
@@ -10,12 +11,13 @@ import type { StreamSize } from './stream_size';
 export function mount_panels(
   parts: PageParts,
   stream_size: StreamSize,
+  measures: MeasureList,
   set_scale: ((metres_per_unit: number) => void) | undefined,
 ): void {
   const { navigation, notice, worker, toolbar, storage } = parts;
   new QualityPanel(navigation, stream_size, worker, storage);
   new StatsPanel(worker, toolbar);
-  new MeasurePanel({ ...parts, set_scale });
+  new MeasurePanel({ ...parts, measures, set_scale });
   navigation.speed_chosen.listen((speed) =>
     notice.show(text.quality.speed_now({ factor: factor(speed) }), 2),
   );

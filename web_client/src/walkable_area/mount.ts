@@ -5,8 +5,11 @@ import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/key';
 import { by_id } from '../page/dom';
+import { kept_system } from '../measure/units';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
+import { file_name_of } from '../session/scenes';
+import type { MeasureList } from '../tour/measure_list';
 import type { TourState } from '../tour/player';
 import type { Stand, WalkMap } from '../walk/walk_map';
 import type { Dollhouse } from './dollhouse';
@@ -17,6 +20,8 @@ import type { Walking } from './walking';
 interface WalkableAreaParts extends PageParts {
   readonly tour_shown: Signal<TourState>;
   readonly go_to_stop: (index: number) => void;
+  /** They know the scale of the scene. */
+  readonly measures: MeasureList;
 }
 
 const warn = (error: unknown): void => console.warn('the walkable area cannot be used', error); // the server is away
@@ -37,7 +42,7 @@ export class WalkableArea {
   private idle_ = false;
 
   constructor(private readonly parts_: WalkableAreaParts) {
-    const { navigation, worker, toolbar, seen, token, notice, tour_shown } = parts_;
+    const { navigation, worker, toolbar, seen, token, notice, tour_shown, measures } = parts_;
     this.loader_ = new WalkMapLoader(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
@@ -70,6 +75,7 @@ export class WalkableArea {
       this.tour_ = state;
       this.show_stops();
     });
+    measures.changed.listen(() => this.plan_?.show_scale());
     worker.on('presented', () => this.presented());
     this.loader_.computing.listen(() => notice.show(text.floor_plan.preparing, 10));
     this.loader_.known.listen((map) => {
@@ -155,6 +161,11 @@ export class WalkableArea {
         go_to_stop: parts.go_to_stop,
         dollhouse: this.house_,
         stand_at: (position) => walking.walker.stand_at(position),
+        scale: () => ({
+          metres_per_unit: parts.measures.metres_per_unit,
+          system: kept_system(parts.storage),
+        }),
+        scene_name: file_name_of(parts.navigation.scene_id),
       },
       map,
       this.eye_,
