@@ -282,6 +282,22 @@ describe('measures', () => {
     expect(list.all).toEqual([door]);
   });
 
+  it('of a link are added once, and not where the scene has them', () => {
+    const { measures: linked } = measures_of_link(
+      link([door, measure_of([mark([0, 0, 0]), mark([1, 1, 1])])]),
+    );
+    const list = new MeasureList();
+    list.enter([], [door]);
+    list.join(linked);
+    list.join(linked);
+    expect(list.own).toEqual([linked[1]]);
+    list.enter(linked, [door]);
+    expect(list.own).toEqual([linked[1]]);
+    list.enter(Array<Measure>(64).fill(door), []);
+    list.join(linked);
+    expect(list.own).toHaveLength(64);
+  });
+
   it('have room for so many and no more', () => {
     const list = new MeasureList();
     for (let k = 0; k < 100; ++k) expect(list.add(mark([k, 0, 0]))).toBe(true);

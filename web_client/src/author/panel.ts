@@ -6,7 +6,7 @@ import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
 import type { MeasureList } from '../tour/measure_list';
-import type { Measure } from '../tour/measures';
+import { without, type Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import { tours_for, type Tour } from '../tour/tour';
@@ -107,7 +107,7 @@ export class AuthorPanel {
     this.save_.hidden = token === undefined;
     this.replace_.hidden = true;
     this.tools_.media.use(this.tools_.navigation.scene_id, token);
-    const own = [...this.tools_.measures.own, ...measures];
+    const own = [...without(this.tools_.measures.own, measures), ...measures];
     this.draft_.load(tours, about, own);
     this.tools_.measures.enter(own, []);
     this.language_.offer(tours);
@@ -321,7 +321,8 @@ export class AuthorPanel {
     const { navigation } = this.tools_;
     if (measures === this.draft_.state.measures || navigation.scene_id !== this.scene_id_) return;
     this.draft_.edit({ measures }, field);
-    this.told();
+    this.say('');
+    this.show_what_can_be_done();
   }
 
   private edited(open_stop?: number): void {
@@ -337,6 +338,7 @@ export class AuthorPanel {
     this.start_ = state.start;
     const { value: language } = this.language_;
     this.tools_.measures.edit_language(language);
+    this.tools_.measures.set_scale(state.about.metres_per_unit || undefined);
     if (state.measures !== this.tools_.measures.own) this.tools_.measures.load(state.measures);
     this.tools_.changed(tours_for(shown, language ? [language] : []), shown_index);
   }

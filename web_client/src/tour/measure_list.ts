@@ -2,7 +2,7 @@
 import { Signal } from '../base/signal';
 import type { Mark } from '../measure/measurement';
 import { max_marks, max_measures } from './limits';
-import { measure_of, type Measure } from './measures';
+import { measure_of, without, type Measure } from './measures';
 import { worded } from './words';
 
 export class MeasureList {
@@ -20,6 +20,7 @@ export class MeasureList {
   }
 
   set_scale(metres_per_unit: number | undefined): void {
+    if (metres_per_unit === this.metres_per_unit_) return;
     this.metres_per_unit_ = metres_per_unit;
     this.changed.emit(undefined);
   }
@@ -53,7 +54,13 @@ export class MeasureList {
   /** The measures of a scene that the visitor has entered. `of_scene`: those that they may not change. */
   enter(own: readonly Measure[], of_scene: readonly Measure[]): void {
     this.of_scene_ = of_scene;
-    this.set(own, undefined);
+    this.set(own.length > 0 ? without(own, of_scene) : own, undefined);
+  }
+
+  /** Adds those of a link, as far as there is room and they are not there. */
+  join(linked: readonly Measure[]): void {
+    const own = [...this.own_, ...without(linked, this.all)];
+    this.set(own.slice(0, max_measures), this.chosen_);
   }
 
   /** Replaces those that the visitor may change. */

@@ -93,7 +93,7 @@ export const write_measures = (measures: readonly Measure[]): unknown[] =>
   }));
 
 /** The first measures, as many as a link has room for. */
-export function measures_for_link(measures: readonly Measure[]): readonly Measure[] {
+function measures_for_link(measures: readonly Measure[]): readonly Measure[] {
   let marks = 0;
   return measures
     .filter(has_length)
@@ -101,15 +101,27 @@ export function measures_for_link(measures: readonly Measure[]): readonly Measur
     .filter((measure) => (marks += measure.marks.length) <= max_linked_marks);
 }
 
-/** Adds `measure=x,y,z,error,dx,dy,dz,…~title` for each measure; d: depth. */
-export function add_to_link(fragment: URLSearchParams, measures: readonly Measure[]): void {
-  for (const { title, marks } of measures_for_link(measures)) {
-    const numbers = marks.flatMap((mark) => {
+/** `x,y,z,error,dx,dy,dz` for each mark; d: depth. */
+const numbers_of = ({ marks }: Measure): string =>
+  marks
+    .map((mark) => {
       const { position, error, depth } = write_mark(mark, 6);
-      return [...position, error, ...depth];
-    });
-    fragment.append('measure', numbers.join(',') + (title && `~${title}`));
+      return [...position, error, ...depth].join(',');
+    })
+    .join(',');
+
+/** Adds `measure=numbers~title` for each measure. */
+export function add_to_link(fragment: URLSearchParams, measures: readonly Measure[]): void {
+  for (const measure of measures_for_link(measures)) {
+    const { title } = measure;
+    fragment.append('measure', numbers_of(measure) + (title && `~${title}`));
   }
+}
+
+/** Those that are not among the others, whatever their names. */
+export function without(measures: readonly Measure[], others: readonly Measure[]): Measure[] {
+  const known = new Set(others.map(numbers_of));
+  return measures.filter((measure) => !known.has(numbers_of(measure)));
 }
 
 /** Reads what add_to_link() writes. */

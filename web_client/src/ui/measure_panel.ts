@@ -7,6 +7,7 @@ import {
   written,
   written_on_line,
   type Scale,
+  type System,
 } from '../measure/units';
 import type { Pointed } from '../input/pointers';
 import { by_id, make, on_click } from '../page/dom';
@@ -38,6 +39,7 @@ export class MeasurePanel {
   private readonly lines_: MeasureLines;
   private asked_: Promise<unknown> = Promise.resolve();
   private begun_ = 0;
+  private is_open_ = false;
 
   constructor(private readonly parts_: MeasureParts) {
     const { navigation, toolbar, seen, measures, set_scale } = parts_;
@@ -64,7 +66,7 @@ export class MeasurePanel {
     on_click('measure-set', () => this.set_scale());
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel !== 'measure') return;
-      this.lines_.shown = shown;
+      this.is_open_ = shown;
       if (shown) navigation.gestures.set('measure', this.take);
       else navigation.gestures.remove('measure');
       this.forget_asked();
@@ -92,8 +94,8 @@ export class MeasurePanel {
   };
 
   private get scale(): Scale {
-    const { measures, storage } = this.parts_;
-    return { metres_per_unit: measures.metres_per_unit, system: kept_system(storage) };
+    const { metres_per_unit } = this.parts_.measures;
+    return { metres_per_unit, system: this.system_.value as System };
   }
 
   /** `x`, `y`: shares of the view. */
@@ -127,6 +129,9 @@ export class MeasurePanel {
   private show(): void {
     const { measures, navigation } = this.parts_;
     const { own, chosen } = measures;
+    // In a frame of another page, a link shows its measures without the panel.
+    this.lines_.shown =
+      this.is_open_ || (own.length > 0 && document.body.classList.contains('bare'));
     this.say('');
     this.show_rows();
     this.show_results(chosen === undefined ? [] : measures.all[chosen]!.marks);
@@ -235,8 +240,6 @@ export class MeasurePanel {
     if (value === 0) return;
     const known = number_in(this.known_, value / units_per_metre, value * units_per_metre);
     if (known === undefined) return void this.known_.reportValidity();
-    const metres_per_unit = Number((known / value).toPrecision(6));
-    this.parts_.set_scale?.(metres_per_unit);
-    measures.set_scale(metres_per_unit);
+    this.parts_.set_scale?.(Number((known / value).toPrecision(6)));
   }
 }

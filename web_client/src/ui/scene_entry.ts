@@ -99,8 +99,9 @@ export class SceneEntry {
 
   private show_linked(linked: readonly Measure[]): void {
     if (linked.length === 0) return;
-    this.parts_.measures.load(linked);
-    this.page_.toolbar.open('measure');
+    this.parts_.measures.join(linked);
+    // Frames of other pages have no panels.
+    if (!document.body.classList.contains('bare')) this.page_.toolbar.open('measure');
   }
 }
 
