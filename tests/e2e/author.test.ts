@@ -126,6 +126,7 @@ describe('an author', () => {
   it('keeps measures for visitors, who add their own in links', async () => {
     /** Marks two points of the ground. */
     const measure = async (page: Page): Promise<void> => {
+      await page.locator('#measure-results p').waitFor();
       const { width, height } = page.viewportSize()!;
       const dots = page.locator('#measure-lines circle');
       const before = await dots.count();

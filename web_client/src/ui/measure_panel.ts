@@ -20,6 +20,7 @@ import type { MeasureList } from '../tour/measure_list';
 import { has_length, type Measure } from '../tour/measures';
 import { words_for } from '../tour/words';
 import { MeasureLines } from './measure_lines';
+import './measure.css';
 
 const units_per_metre = 1e6; // at most, and at least its inverse
 
@@ -65,16 +66,20 @@ export class MeasurePanel {
     by_id('measure-published', HTMLElement).hidden = !set_scale;
     on_click('measure-set', () => this.set_scale());
     toolbar.panel_shown.listen(({ panel, shown }) => {
-      if (panel !== 'measure') return;
-      this.is_open_ = shown;
-      if (shown) navigation.gestures.set('measure', this.take);
-      else navigation.gestures.remove('measure');
-      this.forget_asked();
-      this.show();
+      if (panel === 'measure') this.open(shown);
     });
     navigation.entered.listen(() => this.forget_asked());
     seen.moved.listen((eye) => this.lines_.draw(eye));
     measures.changed.listen(() => this.show());
+    this.open(!by_id('measure-panel', HTMLElement).hidden);
+  }
+
+  private open(shown: boolean): void {
+    const { gestures } = this.parts_.navigation;
+    this.is_open_ = shown;
+    if (shown) gestures.set('measure', this.take);
+    else gestures.remove('measure');
+    this.forget_asked();
     this.show();
   }
 

@@ -5,7 +5,6 @@ import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/key';
 import { by_id } from '../page/dom';
-import { kept_system } from '../measure/units';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
 import { file_name_of } from '../session/scenes';
@@ -161,10 +160,7 @@ export class WalkableArea {
         go_to_stop: parts.go_to_stop,
         dollhouse: this.house_,
         stand_at: (position) => walking.walker.stand_at(position),
-        scale: () => ({
-          metres_per_unit: parts.measures.metres_per_unit,
-          system: kept_system(parts.storage),
-        }),
+        measures: parts.measures,
         scene_name: file_name_of(parts.navigation.scene_id),
       },
       map,

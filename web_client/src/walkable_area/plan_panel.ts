@@ -2,10 +2,11 @@
 import type { KeptTexts } from '../base/browser_storage';
 import { dot, forward, length, rotate, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import type { Scale } from '../measure/units';
+import { kept_system } from '../measure/units';
 import { by_id, icon, make, save_file } from '../page/dom';
 import { number } from '../text/number';
 import { text } from '../text/text';
+import type { MeasureList } from '../tour/measure_list';
 import type { Stop } from '../tour/tour';
 import { clear_near } from '../walk/map_walker';
 import { areas_of } from '../walk/rooms';
@@ -51,7 +52,7 @@ interface PlanParts {
   readonly dollhouse: Dollhouse | undefined;
   /** Where somebody would stand whose eyes are here. */
   readonly stand_at: (position: Vec3) => Stand;
-  readonly scale: () => Scale;
+  readonly measures: Pick<MeasureList, 'metres_per_unit'>;
   /** For files. */
   readonly scene_name: string;
 }
@@ -338,7 +339,9 @@ export class PlanPanel {
   }
 
   private get scale(): PlanScale {
-    return { ...this.parts_.scale(), cell: this.map_.cell };
+    const { measures, storage } = this.parts_;
+    const { metres_per_unit } = measures;
+    return { metres_per_unit, system: kept_system(storage), cell: this.map_.cell };
   }
 
   private async print(): Promise<void> {
