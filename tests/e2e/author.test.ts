@@ -137,6 +137,7 @@ describe('an author', () => {
     };
     const { page, errors } = await open_as('author', '?author');
     await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByLabel('Title of stop 1', { exact: true }).focus();
     await page.getByLabel('Flight, s (1)').fill('3,2');
     await page.getByLabel('Stay, s (1)').fill('4000');
     await expect
