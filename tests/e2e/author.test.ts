@@ -136,7 +136,11 @@ describe('an author', () => {
       }
     };
     const { page, errors } = await open_as('author', '?author');
+    const stops = page.locator('#author-stops > li');
+    await page.getByText('About the scene').waitFor();
+    const before = await stops.count();
     await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await expect.poll(() => stops.count()).toBe(before + 1);
     await page.getByLabel('Title of stop 1', { exact: true }).focus();
     await page.getByLabel('Flight, s (1)').fill('3,2');
     await page.getByLabel('Stay, s (1)').fill('4000');
@@ -149,6 +153,7 @@ describe('an author', () => {
       .toBe('Enter a number from 0 to 3,600.');
     await page.getByLabel('Stay, s (1)').fill('');
     await page.getByRole('button', { name: 'Measure', exact: true }).click();
+    await page.locator('#measure-results p').waitFor();
     await page.getByLabel('Units').selectOption('Metric');
     await measure(page);
     const number = page.locator('#measure-lines .length');
@@ -166,8 +171,8 @@ describe('an author', () => {
     await page.getByLabel('This length in metres').fill('3,2');
     await page.getByRole('button', { name: 'Set the scale' }).click();
     await expect
-      .poll(() => page.locator('#measure-list .value').textContent())
-      .toMatch(/^3\.2\d*\sm$/);
+      .poll(() => page.locator('#measure-results dd').first().textContent())
+      .toMatch(/^3\.2\d*\sm ±/);
     await page.getByLabel('Name of measure 1').fill('The gate');
     await keep_screenshot(page, 'measures');
     expect(await barriers(page)).toEqual([]);
