@@ -293,7 +293,9 @@ describe('measures', () => {
     expect(list.own).toEqual([linked[1]]);
     list.enter(linked, [door]);
     expect(list.own).toEqual([linked[1]]);
-    list.enter(Array<Measure>(64).fill(door), []);
+    const all = Array<Measure>(64).fill(door);
+    list.enter(all, []);
+    expect(list.own).toBe(all); // an author has changed nothing yet
     list.join(linked);
     expect(list.own).toHaveLength(64);
   });

@@ -54,7 +54,7 @@ export class MeasureList {
   /** The measures of a scene that the visitor has entered. `of_scene`: those that they may not change. */
   enter(own: readonly Measure[], of_scene: readonly Measure[]): void {
     this.of_scene_ = of_scene;
-    this.set(own.length > 0 ? without(own, of_scene) : own, undefined);
+    this.set(of_scene.length > 0 ? without(own, of_scene) : own, undefined);
   }
 
   /** Adds those of a link, as far as there is room and they are not there. */

@@ -42,7 +42,9 @@ export class SceneEntry {
       const shared = read_shared(location.href);
       views.show(shared);
       views.show_stop(shared);
-      this.show_linked(this.linked());
+      const linked = measures_of_link(location.href);
+      this.show_linked(linked.measures);
+      this.say_unread(linked.problems);
     });
   }
 
@@ -54,10 +56,10 @@ export class SceneEntry {
     const load = ++this.loads_;
     const arrival = travel.arrive(scene_id);
     const shared = arrival ?? read_shared(location.href);
-    const linked = arrival ? [] : this.linked();
+    const linked = measures_of_link(arrival ? location.origin : location.href);
     list.enter([], []);
     list.set_scale(scene.metresPerUnit || undefined);
-    this.show_linked(linked);
+    this.show_linked(linked.measures);
     views.show(shared);
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
@@ -68,8 +70,7 @@ export class SceneEntry {
     await scenes.learn(tours);
     if (load !== this.loads_) return;
     for (const problem of problems) notice.show(text.tour.unreadable({ why: problem }));
-    for (const problem of read.unread_measures)
-      notice.show(text.measure.unreadable({ why: problem }));
+    this.say_unread([...read.unread_measures, ...linked.problems]);
     if (start) {
       camera.start_at(start);
       if (!shared.eye && !navigation.led) navigation.reset();
@@ -90,11 +91,8 @@ export class SceneEntry {
     embed.say({ catgs: 'ready', scene: scene_name(scene_id), stops });
   }
 
-  /** The measures of the page's address. */
-  private linked(): readonly Measure[] {
-    const { measures, problems } = measures_of_link(location.href);
+  private say_unread(problems: readonly string[]): void {
     for (const why of problems) this.page_.notice.show(text.measure.unreadable({ why }));
-    return measures;
   }
 
   private show_linked(linked: readonly Measure[]): void {
