@@ -28,20 +28,21 @@ bool is_file(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file, error);
 }
 
-nlohmann::json sidecar_tours(const std::filesystem::path& sidecar, std::string_view text,
-                             const MediaOrigins& media_origins) {
+void add_page_fields(const std::filesystem::path& sidecar, std::string_view text,
+                     const MediaOrigins& media_origins, nlohmann::json& to) {
   const MemorySource file(sidecar.string(), std::as_bytes(std::span(text)));
   const nlohmann::json document = read_json(file, max_bytes);
   const JsonField root(file.name(), document);
-  const auto tours = root.find("tours");
-  if (!tours) return nullptr;
-  static_cast<void>(tours->size());  // throws if it is no array
+  for (const char* name : {"tours", "measures"})
+    if (const auto field = root.find(name)) {
+      static_cast<void>(field->size());  // throws if it is no array
+      to[name] = field->value();
+    }
   try {
-    check_tours(root, &media_origins);
+    check_page_fields(root, &media_origins);
   } catch (const InputError& mistake) {
-    log_warning({.event = "tours_faulty"}, "{}{}", faulty_tours, mistake.what());
+    log_warning({.event = "tours_faulty"}, "{}{}", faulty_for_pages, mistake.what());
   }
-  return tours->value();
 }
 
 nlohmann::json viewer_settings(const std::filesystem::path& sidecar) {
@@ -68,16 +69,18 @@ Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_orig
   const nlohmann::json document = read_json(source, max_sent_sidecar_bytes);
   Sidecar sidecar = read_sidecar(source, origin);
   if (sidecar.unknown) throw InputError(source.name(), "", *sidecar.unknown);
-  check_tours(JsonField(source.name(), document), &media_origins);
+  check_page_fields(JsonField(source.name(), document), &media_origins);
   return sidecar;
 }
 
 std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text,
                      const MediaOrigins& media_origins) {
-  nlohmann::json document{
-      {"tours", nullptr}, {"etag", nullptr}, {"settings", viewer_settings(sidecar)}};
+  nlohmann::json document{{"tours", nullptr},
+                          {"measures", nullptr},
+                          {"etag", nullptr},
+                          {"settings", viewer_settings(sidecar)}};
   if (text) {
-    document["tours"] = sidecar_tours(sidecar, *text, media_origins);
+    add_page_fields(sidecar, *text, media_origins, document);
     document["etag"] = etag_of(*text);
   }
   return document.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

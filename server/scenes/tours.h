@@ -14,13 +14,14 @@
 
 namespace catgs {
 
-/// Returns what pages get about a scene's tours, as JSON: {"tours": …, "settings": …, "etag": …}.
-/// - `tours` is that member of the scene's sidecar (see hints.h), and `etag` is the tag of the
-///   whole sidecar;
+/// Returns what pages get about a scene's tours, as JSON:
+/// {"tours": …, "measures": …, "settings": …, "etag": …}.
+/// - `tours` and `measures` are members of the scene's sidecar (see hints.h), and `etag` is the tag
+///   of the whole sidecar;
 /// - `settings` is the SuperSplat viewer's file: `<scene>.settings.json`, or `settings.json` in the
 ///   scene's folder.
 /// A missing one is null. Throws InputError where size or syntax of the sidecar are wrong. The page
-/// reads the tours, as far as it can, so a mistake that check_tours() finds in them is only logged.
+/// reads them as far as it can, so a mistake that check_page_fields() finds in them is only logged.
 /// So is an unusable settings file, which was not written for us. `sidecar` is the sidecar's path,
 /// even if there is no file. `text` is its content, if any.
 std::string tours_of(const std::filesystem::path& sidecar, const std::optional<std::string>& text,
@@ -45,8 +46,8 @@ struct ToursAnswers {
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
 
 /// Checks a sidecar sent by an author. It is stricter than for operators' files: every field must
-/// be known, and check_tours() finds no mistake. Throws InputError that names the field. Its places
-/// are returned about `origin`.
+/// be known, and check_page_fields() finds no mistake. Throws InputError that names the field. Its
+/// places are returned about `origin`.
 Sidecar check_sent_sidecar(std::string_view json, const MediaOrigins& media_origins = {},
                            const glm::dvec3& origin = glm::dvec3(0.0));
 

@@ -4,6 +4,7 @@ import path from 'node:path';
 import type { BrowserContextOptions, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import type { Pose } from '#client/camera/eye';
+import { barriers } from './support/axe';
 import { keep_screenshot, open, windows, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import {
@@ -101,6 +102,110 @@ describe('an author', () => {
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText('Saved. Visitors see it').waitFor();
     expect(readFileSync(sidecar, 'utf8')).toContain('Changed.');
+  });
+
+  it('sees three stops and more on a usual screen', async () => {
+    const { page } = await open_as('author', '?author', { viewport: { width: 1440, height: 900 } });
+    const add = page.getByRole('button', { name: 'Add a stop here' });
+    const stops = page.locator('#author-stops > li');
+    await add.waitFor();
+    const before = await stops.count();
+    for (let n = before + 1; n <= before + 4; ++n) {
+      await add.click();
+      await page.getByLabel(`Title of stop ${n}`).waitFor();
+    }
+    await page.getByLabel('Title of stop 1', { exact: true }).focus();
+    const list = (await page.locator('#author-stops').boundingBox())!;
+    const boxes = await Promise.all((await stops.all()).map((stop) => stop.boundingBox()));
+    const seen = boxes.filter(
+      (box) => box!.y >= list.y && box!.y + box!.height <= list.y + list.height,
+    );
+    expect(seen.length).toBeGreaterThanOrEqual(3);
+  });
+
+  it('keeps measures for visitors, who add their own in links', async () => {
+    /** Marks two points of the ground. */
+    const measure = async (page: Page): Promise<void> => {
+      await page.locator('#measure-results p').waitFor();
+      const { width, height } = page.viewportSize()!;
+      const dots = page.locator('#measure-lines circle');
+      const before = await dots.count();
+      for (const [k, x] of [0.35, 0.5].entries()) {
+        await page.mouse.click(x * width, 0.6 * height);
+        await expect.poll(() => dots.count()).toBe(before + k + 1);
+      }
+    };
+    const { page, errors } = await open_as('author', '?author');
+    const stops = page.locator('#author-stops > li');
+    await page.getByText('About the scene').waitFor();
+    const before = await stops.count();
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await expect.poll(() => stops.count()).toBe(before + 1);
+    await page.getByLabel('Title of stop 1', { exact: true }).focus();
+    await page.getByLabel('Flight, s (1)').fill('3,2');
+    await page.getByLabel('Stay, s (1)').fill('4000');
+    await expect
+      .poll(() =>
+        page
+          .getByLabel('Stay, s (1)')
+          .evaluate((field: HTMLInputElement) => field.validationMessage),
+      )
+      .toBe('Enter a number from 0 to 3,600.');
+    await page.getByLabel('Stay, s (1)').fill('');
+    await page.getByRole('button', { name: 'Measure', exact: true }).click();
+    await page.locator('#measure-results p').waitFor();
+    await page.getByLabel('Units').selectOption('Metric');
+    await measure(page);
+    const number = page.locator('#measure-lines .length');
+    const length = await number.textContent();
+    const end = page.getByRole('button', { name: /^Point 2 of Measure 1;/ });
+    const box = (await end.boundingBox())!;
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 120, box.y + 30, { steps: 4 });
+    await page.mouse.up();
+    await expect.poll(() => number.textContent()).not.toBe(length);
+    await page.getByLabel('This length in metres').fill('0');
+    await page.getByRole('button', { name: 'Set the scale' }).click();
+    expect(await page.locator('#measure-known:invalid').count()).toBe(1);
+    await page.getByLabel('This length in metres').fill('3,2');
+    await page.getByRole('button', { name: 'Set the scale' }).click();
+    await expect
+      .poll(() => page.locator('#measure-results dd').first().textContent())
+      .toMatch(/^3\.2\d*\sm ±/);
+    await page.getByLabel('Name of measure 1').fill('The gate');
+    await keep_screenshot(page, 'measures');
+    expect(await barriers(page)).toEqual([]);
+    await page.getByRole('button', { name: 'Make a tour' }).click();
+    await page.getByRole('button', { name: 'Save to the server' }).click();
+    await page.getByText('Saved. Visitors see it').waitFor();
+    const saved = JSON.parse(readFileSync(sidecar, 'utf8')) as {
+      readonly measures: readonly { readonly title: string }[];
+      readonly tours: readonly { readonly stops: readonly { readonly fly_s?: number }[] }[];
+    };
+    expect(saved.measures).toMatchObject([{ title: 'The gate' }]);
+    expect(saved.tours[0]!.stops.some(({ fly_s }) => fly_s === 3.2)).toBe(true);
+    expect(errors).toEqual([]);
+
+    const visitor = await open_as('viewer');
+    await settle(visitor.page);
+    await visitor.page.getByRole('button', { name: 'Measure', exact: true }).click();
+    await visitor.page.getByRole('button', { name: 'The gate' }).waitFor();
+    await measure(visitor.page);
+    await visitor.page.getByLabel('Name of measure 1').fill('3 ~ mine');
+    await visitor.page.getByRole('button', { name: 'Share' }).click();
+    const link = await visitor.page.getByLabel('Link to this view').inputValue();
+    await visitor.page.getByLabel('With my measures').uncheck();
+    expect(await visitor.page.getByLabel('Link to this view').inputValue()).not.toContain(
+      'measure',
+    );
+    const guest = await open(`${link}&measure=1,2&token=${access_token('viewer')}`, windows.phone);
+    await guest.page.getByText('A measure cannot be read: measure[1].marks').waitFor();
+    expect(await guest.page.getByLabel('Name of measure 1').inputValue()).toBe('3 ~ mine');
+    await guest.page.getByRole('button', { name: 'The gate' }).waitFor();
+    await settle(guest.page);
+    await keep_screenshot(guest.page, 'measures-of-link');
+    expect([...visitor.errors, ...guest.errors]).toEqual([]);
   });
 
   it('takes back every edit, and keeps the focus where it works', async () => {

@@ -151,6 +151,7 @@ describe('Firefox', () => {
     await page.keep_screenshot('firefox-walked');
 
     await page.click('#button-measure');
+    await page.until(`document.querySelector('#measure-results p')`);
     await page.click([500, 640]);
     await page.click('#measure-middle');
     await page.until(`/\\d/.test(document.querySelector('#measure-results dd')?.innerText)`);

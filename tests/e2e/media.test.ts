@@ -98,6 +98,7 @@ describe('an author', () => {
     await expect
       .poll(() => page.getByLabel('Captions of guide.wav', { exact: true }).inputValue())
       .toBe('guide.vtt');
+    await page.getByText('More about the tour').click();
     await send('Sound of the tour', 'sea.wav', tone(3));
     await expect
       .poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue())

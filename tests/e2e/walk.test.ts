@@ -1,5 +1,6 @@
 // Walking on the ground of a scene, and its floor plan, against the real server.
 import { writeFileSync } from 'node:fs';
+import { readFile } from 'node:fs/promises';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -192,6 +193,48 @@ describe('the floor plan', () => {
     await expect.poll(async () => distance(at_stop, await pose_of(page))).toBeGreaterThan(1);
     expect(distance(begin, at_stop)).toBeGreaterThan(1);
     expect(errors).toEqual([]);
+  });
+
+  it('and the editor never cover each other, however large they grow', async () => {
+    const { page } = await open(`${server.url}?author`, { viewport: { width: 1440, height: 900 } });
+    const [plan, editor] = [page.locator('#plan-panel'), page.locator('#author-panel')];
+    await editor.waitFor();
+    await page.locator('#button-plan').click();
+    await plan.getByRole('button', { name: 'Larger' }).click();
+    await plan.locator('[aria-busy=false]').waitFor();
+    const [a, b] = [(await plan.boundingBox())!, (await editor.boundingBox())!];
+    expect(a.x).toBeGreaterThanOrEqual(0);
+    expect(a.x + a.width).toBeLessThanOrEqual(b.x);
+    await keep_screenshot(page, 'plan-and-editor');
+    await page.setViewportSize({ width: 1000, height: 900 });
+    await editor.waitFor({ state: 'hidden' });
+    expect(await plan.isVisible()).toBe(true);
+    // A panel that grows over another one takes its place.
+    await plan.getByRole('button', { name: 'Smaller' }).click();
+    await page.locator('#button-measure').click();
+    expect(await plan.isVisible()).toBe(true);
+    await plan.getByRole('button', { name: 'Larger' }).click();
+    await page.locator('#measure-panel').waitFor({ state: 'hidden' });
+    expect(await plan.isVisible()).toBe(true);
+  });
+
+  it('says its scale, its area, and that it is a sketch, also on paper', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    await page.locator('#button-plan').click();
+    const plan = page.locator('#plan-panel');
+    await plan.getByRole('button', { name: 'Larger' }).click();
+    await plan
+      .getByText(/^about [\d.,]+\s(ft²|mi²) · Sketch from the scan, not a survey$/)
+      .waitFor();
+    const download = page.waitForEvent('download');
+    await plan.getByRole('button', { name: 'Save for printing' }).click();
+    const file = await download;
+    expect(file.suggestedFilename()).toBe('city-1.png');
+    const png = await readFile(await file.path());
+    const sides_px = [png.readUInt32BE(16), png.readUInt32BE(20)].sort((a, b) => a - b);
+    expect(sides_px).toEqual([2591, 3353]); // Letter, 12 px a mm
+    expect(png.subarray(37, 41).toString()).toBe('pHYs');
+    expect(png.readUInt32BE(41)).toBe(12_000);
   });
 
   it('turns with the view, and remembers it', async () => {

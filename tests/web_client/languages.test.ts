@@ -6,7 +6,7 @@ import ts from 'typescript';
 import { describe, expect, it } from 'vitest';
 import { choose_language, languages } from '#client/text/language';
 import { messages, type Catalogue } from '#client/text/messages';
-import { decimals, duration, factor, number } from '#client/text/number';
+import { decimals, duration, factor, number, read_number } from '#client/text/number';
 import { load_texts } from '#client/text/text';
 
 const source = fileURLToPath(new URL('../../web_client/src', import.meta.url));
@@ -205,9 +205,9 @@ describe('texts for people', () => {
   const is_prose = (words: string): boolean =>
     /[a-z]{2,} [a-z]{2,}/i.test(words) || /^[A-Z][a-z]{2,}( |$)/.test(words);
 
-  // Shaders, markup and names that browsers give.
+  // Shaders, markup, and names that browsers give or that paper has.
   const not_prose =
-    /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad)[A-Z]?[a-z]*$|^(OffscreenCanvas|WebSocket|Worker|Notification|Unidentified|Bearer |noopener noreferrer)$/;
+    /^#version|^\s*<iframe|^\d+px |^double tap$|^(Key|Page|Arrow|Escape|Space|Tab|Shift|Numpad|Delete|Backspace)[A-Z]?[a-z]*$|^(Letter|OffscreenCanvas|WebSocket|Worker|Notification|Unidentified|Bearer |noopener noreferrer)$/;
 
   it('are in the files of the languages alone', () => {
     const loose: string[] = [];
@@ -239,4 +239,31 @@ describe('texts for people', () => {
     expect(files.length).toBeGreaterThan(60);
     expect(loose).toEqual([]);
   }, 60_000); // it parses the whole client
+});
+
+it.each([
+  ['3,2', 3.2],
+  ['3.2', 3.2],
+  [' 3,20 ', 3.2],
+  [',5', 0.5],
+  ['7.', 7],
+  ['-1,5', -1.5],
+  ['−1.5', -1.5],
+  ['٣٫٢', 3.2],
+  ['３．２', 3.2],
+  ['1.234,5', 1234.5],
+  ['1,234.5', 1234.5],
+  ["1'234.5", 1234.5],
+  ['1\u202f234,5', 1234.5],
+  ['1,234,567', 1234567],
+  ['1,234', 1.234], // one comma alone begins the decimals
+  ['', undefined],
+  ['3,2,1', undefined],
+  ['1.2,3.4', undefined],
+  ['12,34.5', undefined],
+  ['3.2 m', undefined],
+  ['1e5', undefined],
+  ['Infinity', undefined],
+])('"%s" is a number in every language', (written, value) => {
+  expect(read_number(written)).toBe(value);
 });

@@ -5,11 +5,13 @@ import { CameraController } from '#client/camera/camera_controller';
 import { no_axes } from '#client/camera/movement';
 import { WalkMapLoader } from '#client/walkable_area/walk_map_loader';
 import { plan_picture } from '#client/walkable_area/plan_picture';
+import { sheet_for, with_resolution } from '#client/walkable_area/plan_sheet';
 import { cells_of, px_of } from '#client/walkable_area/plan_view';
 import { door_ahead, metres_per_unit } from '#client/walk/door';
 import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
+import { areas_of } from '#client/walk/rooms';
 import { stroll } from '#client/walk/stroll';
 import {
   cells_per_eye_height,
@@ -345,5 +347,75 @@ describe('a walk map that the server still computes', () => {
     expect(told).not.toHaveBeenCalled();
     void loader.want();
     expect(told).toHaveBeenCalledTimes(1);
+  });
+});
+
+describe('the areas of a storey', () => {
+  /** Two rooms of 30x30 and 20x30 columns with a wall between them and a door of `door` columns. */
+  const two_rooms = (door: number): WalkMap =>
+    flat_map(70, 40, (x, y) => {
+      const inside = x >= 5 && x < 56 && y >= 5 && y < 35;
+      return inside && (x !== 35 || Math.abs(y - 20) < door / 2);
+    });
+
+  it('are those of rooms, which doors separate', async () => {
+    const { cells, rooms } = await areas_of(two_rooms(9), 0, true);
+    expect(cells).toBe(51 * 30 - 30 + 9);
+    expect(rooms.map((room) => Math.round(room.cells / 10))).toEqual([91, 60]);
+    expect(rooms.reduce((sum, room) => sum + room.cells, 0)).toBe(cells);
+    const [large, small] = rooms;
+    expect(Math.hypot(large!.east - 20, large!.north - 20)).toBeLessThan(2);
+    expect(small!.east).toBeGreaterThan(36);
+    expect(Math.abs(small!.radius - 10)).toBeLessThan(1.5);
+  });
+
+  it('are those of one room where an opening is wider than a door', async () => {
+    expect((await areas_of(two_rooms(20), 0, true)).rooms).toHaveLength(1);
+  });
+
+  it('have no rooms out of doors, and none where nobody can stand', async () => {
+    expect((await areas_of(two_rooms(9), 0, false)).rooms).toEqual([]);
+    expect(
+      await areas_of(
+        flat_map(70, 40, () => false),
+        0,
+        true,
+      ),
+    ).toEqual({ cells: 0, rooms: [] });
+  });
+});
+
+describe('a printed plan', () => {
+  const metric = { metres_per_unit: 1, system: 'metric', cell: 0.1 } as const;
+
+  it('has a usual scale at which the storey fits the paper, upright or across', () => {
+    const upright = sheet_for(100, 150, metric);
+    expect(upright).toMatchObject({ name: 'A4', width_px: 2520, height_px: 3564, denominator: 75 });
+    const across = sheet_for(150, 100, metric);
+    expect(across).toMatchObject({ width_px: 3564, height_px: 2520, denominator: 75 });
+    // 10 m at 1:75 are 133 mm of 12 px each.
+    expect(upright.px_per_cell * 100).toBeCloseTo((10_000 / 75) * 12);
+    for (const { inner, px_per_cell } of [upright, across])
+      expect(100 * px_per_cell).toBeLessThan(Math.min(...inner));
+    expect(sheet_for(100, 150, { ...metric, system: 'imperial' }).name).toBe('Letter');
+  });
+
+  it('fills the paper where nobody knows the scale', () => {
+    const { inner, px_per_cell, denominator } = sheet_for(100, 400, {
+      ...metric,
+      metres_per_unit: undefined,
+    });
+    expect(denominator).toBeUndefined();
+    expect(400 * px_per_cell).toBeCloseTo(inner[1]);
+  });
+
+  it('says its resolution, so that it prints at its size', () => {
+    const png = new Uint8Array(60).fill(7);
+    const sized = with_resolution(png);
+    expect(Buffer.from(sized.subarray(33, 54)).toString('hex')).toBe(
+      '000000097048597300002ee000002ee0010f0ed7e1',
+    );
+    expect(sized.subarray(0, 33)).toEqual(png.subarray(0, 33));
+    expect(sized.subarray(54)).toEqual(png.subarray(33));
   });
 });

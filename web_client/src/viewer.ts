@@ -25,11 +25,12 @@ export function mount_viewer(
   const { view, worker, navigation, clock } = parts;
   const stream_size = new StreamSize(view, worker);
   const media = new TourMedia(() => token.value);
-  const { tours, set_scale } = mount_tours(parts, media, new TourMediaFields());
+  const { tours, measures, set_scale } = mount_tours(parts, media, new TourMediaFields());
   media.enlarged.listen(() => tours.player.pause());
-  mount_panels(parts, stream_size, set_scale);
+  mount_panels(parts, stream_size, measures, set_scale);
   const walkable_area = new WalkableArea({
     ...parts,
+    measures,
     tour_shown: tours.shown,
     go_to_stop: (index) => tours.player.go_to(index),
     set_scale,

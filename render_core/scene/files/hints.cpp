@@ -108,8 +108,8 @@ Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin) {
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
   static constexpr std::array known = {
-      "up",      "start_pose", "near",       "limits", "focus", "title",           "credits",
-      "licence", "mode",       "background", "model",  "tours", "metres_per_unit", hash_field};
+      "up",   "start_pose", "near",  "limits", "focus",    "title",           "credits", "licence",
+      "mode", "background", "model", "tours",  "measures", "metres_per_unit", hash_field};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -179,7 +179,7 @@ bool is_unedited(const std::filesystem::path& sidecar) {
 }
 
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
-                   const nlohmann::ordered_json* tours) {
+                   const nlohmann::ordered_json* page_fields) {
   const auto point = [&](const glm::vec3& p) { return json_location(p, hints.origin); };
   const glm::quat& q = hints.start_pose.orientation;
   nlohmann::ordered_json document = {
@@ -201,7 +201,8 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
   if (about.background_rgb != 0)
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
   if (about.metres_per_unit != 0.0f) document["metres_per_unit"] = about.metres_per_unit;
-  if (tours && !tours->is_null()) document["tours"] = *tours;
+  if (page_fields)
+    for (const auto& [name, value] : page_fields->items()) document[name] = value;
   document[hash_field] = hash_of(nlohmann::json::parse(document.dump()));
   PartFile file(path);  // a server may read it meanwhile
   file.stream() << document.dump(2) << '\n';

@@ -37,7 +37,7 @@ inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 ///   "background": "#rrggbb"
 ///   "metres_per_unit": length of a world unit
 ///   "model":      "default", "antialiased" or "2dgs", in place of what the scene's file says
-///   "tours":      for pages, see web_client/TOURS.md
+///   "tours", "measures": for pages, see web_client/TOURS.md
 ///   "convert_hash": of all other fields as catgs-render convert wrote them, see is_unedited()
 struct Sidecar {
   struct StartPose {
@@ -69,10 +69,9 @@ std::filesystem::path sidecar_of(const std::filesystem::path& scene_file);
 /// Whether a sidecar is as write_sidecar() has written it, so that nothing of an author is in it.
 bool is_unedited(const std::filesystem::path& sidecar);
 
-/// Writes all hints as a sidecar, and the value of its "tours" if there is one. Throws InputError
-/// when that fails.
+/// Writes all hints as a sidecar, and the fields for pages. Throws InputError when that fails.
 void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
-                   const nlohmann::ordered_json* tours = nullptr);
+                   const nlohmann::ordered_json* page_fields = nullptr);
 
 /// Files that may hold hints; empty paths are skipped.
 struct HintFiles {

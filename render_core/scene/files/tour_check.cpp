@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
+#include "render_core/math/camera.h"
 #include "render_core/scene/files/media_name.h"
 
 namespace catgs {
@@ -24,6 +25,8 @@ constexpr std::size_t max_stops = 256;
 constexpr std::size_t max_languages = 32;
 constexpr std::size_t max_text_bytes = 16'000;  // 4000 characters
 constexpr std::size_t max_media = 8;
+constexpr std::size_t max_measures = 64;
+constexpr std::size_t max_marks = 100;
 constexpr std::size_t max_address_bytes = 2000;
 constexpr float longest_stay_s = 3600;
 constexpr float longest_flight_s = 120;
@@ -204,9 +207,31 @@ void check_tour(const JsonField& tour, const MediaOrigins* origins) {
   for (std::size_t i = 0; i < stops.size(); ++i) check_stop(stops[i], origins);
 }
 
+void check_measure(const JsonField& measure) {
+  check_members(measure, {"title", "translations", "marks"});
+  check_text(measure.find("title"));
+  check_translations(measure, {"title"});
+  const JsonField marks = measure.at("marks");
+  if (marks.size() < 2 || marks.size() > max_marks)
+    marks.fail(fmt::format("has {} entries, 2 to {} make a measure", marks.size(), max_marks));
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    check_members(marks[i], {"position", "error", "depth"});
+    static_cast<void>(marks[i].at("position").position());
+    check_number(marks[i].find("error"), 0.0f, max_coordinate);
+    if (const auto depth = marks[i].find("depth")) static_cast<void>(depth->position());
+  }
+}
+
+void check_measures(const JsonField& measures) {
+  if (measures.size() > max_measures)
+    measures.fail(fmt::format("has {} entries, at most {}", measures.size(), max_measures));
+  for (std::size_t i = 0; i < measures.size(); ++i) check_measure(measures[i]);
+}
+
 }  // namespace
 
-void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins) {
+void check_page_fields(const JsonField& sidecar, const MediaOrigins* media_origins) {
+  if (const auto measures = sidecar.find("measures")) check_measures(*measures);
   const auto tours = sidecar.find("tours");
   if (!tours) return;
   if (tours->size() > max_tours)
@@ -214,15 +239,15 @@ void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins) {
   for (std::size_t i = 0; i < tours->size(); ++i) check_tour((*tours)[i], media_origins);
 }
 
-std::optional<std::string> mistake_in_tours(const HintFiles& files) {
+std::optional<std::string> mistake_for_pages(const HintFiles& files) {
   std::error_code error;
   if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error)) return {};
   try {
     const FileSource file(files.sidecar);
     const nlohmann::json document = read_json(file, max_sidecar_bytes);
-    check_tours(JsonField(file.name(), document), nullptr);
+    check_page_fields(JsonField(file.name(), document), nullptr);
   } catch (const InputError& mistake) {
-    return fmt::format("{}{}", faulty_tours, mistake.what());
+    return fmt::format("{}{}", faulty_for_pages, mistake.what());
   }
   return std::nullopt;
 }

@@ -16,16 +16,17 @@ using MediaOrigins = std::vector<std::string>;
 
 inline constexpr std::size_t max_portal_bytes = 128;  // of the id of a scene that one leads to
 
-/// Checks the tours of a sidecar, more strictly than pages do: every field must be known, of the
-/// right type and within bounds. Media are files of the scene's folder, or addresses at
-/// `media_origins`; null: at any site. Throws InputError that names the field.
-void check_tours(const JsonField& sidecar, const MediaOrigins* media_origins);
+/// Checks the tours and measures of a sidecar, more strictly than pages do: every field must be
+/// known, of the right type and within bounds. Media are files of the scene's folder, or addresses
+/// at `media_origins`; null: at any site. Throws InputError that names the field.
+void check_page_fields(const JsonField& sidecar, const MediaOrigins* media_origins);
 
-/// Begins the warning about a mistake that check_tours() finds in a file.
-inline constexpr std::string_view faulty_tours = "pages may not show all of these tours: ";
+/// Begins the warning about a mistake that check_page_fields() finds in a file.
+inline constexpr std::string_view faulty_for_pages =
+    "pages may not show all of its tours and measures: ";
 
-/// Checks the tours of a scene, with media at any site. Returns the warning about the first
-/// mistake; nothing if there is none.
-std::optional<std::string> mistake_in_tours(const HintFiles& files);
+/// Checks the tours and measures of a scene, with media at any site. Returns the warning about the
+/// first mistake; nothing if there is none.
+std::optional<std::string> mistake_for_pages(const HintFiles& files);
 
 }  // namespace catgs

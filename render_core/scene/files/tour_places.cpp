@@ -38,6 +38,12 @@ void place_member(const std::string& name, nlohmann::ordered_json& value,
   } else if (name == "orientation" && are_numbers(value, 4)) {
     const glm::quat to(placement.rotation * glm::dquat(number(3), number(0), number(1), number(2)));
     value = {to.x, to.y, to.z, to.w};
+  } else if (name == "error" && value.is_number()) {
+    value = value.get<double>() * placement.scale;
+  } else if (name == "depth" && are_numbers(value, 3)) {
+    const glm::dvec3 to = placement.scale * (glm::dquat(placement.rotation) *
+                                             glm::dvec3(number(0), number(1), number(2)));
+    value = {to.x, to.y, to.z};
   } else if (name != "portal") {
     place_tours(value, placement, origin);
   }
@@ -45,12 +51,16 @@ void place_member(const std::string& name, nlohmann::ordered_json& value,
 
 }  // namespace
 
-nlohmann::ordered_json tours_in_sidecar(const HintFiles& files) {
+nlohmann::ordered_json page_fields_in_sidecar(const HintFiles& files) {
+  nlohmann::ordered_json fields = nlohmann::ordered_json::object();
   std::error_code error;
-  if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error)) return {};
+  if (files.sidecar.empty() || !std::filesystem::is_regular_file(files.sidecar, error))
+    return fields;
   const nlohmann::json document = read_json(FileSource(files.sidecar), max_sidecar_bytes);
-  const auto tours = document.find("tours");
-  return tours == document.end() ? nlohmann::ordered_json() : nlohmann::ordered_json(*tours);
+  for (const char* name : {"tours", "measures"})
+    if (const auto field = document.find(name); field != document.end() && !field->is_null())
+      fields[name] = nlohmann::ordered_json(*field);
+  return fields;
 }
 
 void place_tours(nlohmann::ordered_json& tours, const Placement& placement,

@@ -7,13 +7,14 @@
 
 namespace catgs {
 
-/// The "tours" of the sidecar; null if there are none. Throws InputError for a
-/// file that is no JSON.
-nlohmann::ordered_json tours_in_sidecar(const HintFiles& files);
+/// The fields of the sidecar that are for pages: "tours" and "measures", those that are there.
+/// Throws InputError for a file that is no JSON.
+nlohmann::ordered_json page_fields_in_sidecar(const HintFiles& files);
 
 /// Places all that lies in the scene: members "position", "look_at" and "marker" of three numbers,
-/// and "orientation" of four, at any depth. Everything else stays, known or not, and so do the
-/// places of portals, which are in other scenes. `origin`: of the placed scene.
+/// and "orientation" of four, at any depth, and "error" and "depth" of measures. Everything else
+/// stays, known or not, and so do the places of portals, which are in other scenes. `origin`: of
+/// the placed scene.
 void place_tours(nlohmann::ordered_json& tours, const Placement& placement,
                  const glm::dvec3& origin = glm::dvec3(0.0));
 

@@ -152,16 +152,16 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
                        "the view may be of another scene: look, or move it away and convert again");
   if (moves(conversion, done) && shares_sidecar(conversion))
     return leave("was not written, since it would be the input's, too");
-  nlohmann::ordered_json tours = tours_in_sidecar(conversion.in.hints);
+  nlohmann::ordered_json page_fields = page_fields_in_sidecar(conversion.in.hints);
   Placement placement = conversion.edit.placement;
   if (!keeps_origin(conversion.options.out)) placement.offset -= done.origin;
-  if (placement.moves()) place_tours(tours, placement, written.origin);
-  write_sidecar(written, sidecar, &tours);
+  if (placement.moves()) place_tours(page_fields, placement, written.origin);
+  write_sidecar(written, sidecar, &page_fields);
   fmt::print("{}: first view, {}{}\n", sidecar.string(), hints.source == "estimated" ? "" : "from ",
              hints.source);
   if (conversion.edit.crop)
     fmt::print(stderr, "note: its first view and limits are still those of the whole scene\n");
-  if (!tours.is_null()) copy_media(conversion.in.hints.sidecar, sidecar);
+  if (page_fields.contains("tours")) copy_media(conversion.in.hints.sidecar, sidecar);
 }
 
 /// Before the scene is loaded, which may take minutes.

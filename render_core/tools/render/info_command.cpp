@@ -158,7 +158,7 @@ void print_text(const Json& info) {
 void info(const InfoOptions& options, bool quiet) {
   const SceneLocation location = locate_scene(options.scene.path);
   std::vector<std::string> notes;
-  if (auto mistake = mistake_in_tours(location.hints)) notes.push_back(*std::move(mistake));
+  if (auto mistake = mistake_for_pages(location.hints)) notes.push_back(*std::move(mistake));
   if (location.is_in_pages()) {
     TreeFile tree(std::make_unique<FileSource>(location.files.path));
     require_root(tree);

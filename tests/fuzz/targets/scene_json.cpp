@@ -143,7 +143,9 @@ std::map<std::string, std::string> sent_sidecar_seeds() {
                        "title":"Door","caption":"Oak.","position":[1,2,3],"orientation":[0,0,0,1],
                        "fov_deg":60,"marker":[1,2,4],"stay_s":8,"fly_s":2,
                        "portal":{"scene":"attic","stop":2}},
-                       {"position":[0,1,2],"look_at":[0,0,0]}]}]})"}};
+                       {"position":[0,1,2],"look_at":[0,0,0]}]}],
+                       "measures":[{"title":"Gate","translations":{"de":{"title":"Tor"}},"marks":[
+                       {"position":[0,0,4],"error":0.02,"depth":[0,0,0.1]},{"position":[1,0,4]}]}]})"}};
 }
 
 void parse_film(Bytes input) {
@@ -211,7 +213,7 @@ std::vector<Target> scene_json_targets() {
           {.name = "tours",
            .parse = parse_tours,
            .seeds = tours_seeds,
-           .dictionary = json_words("tours animTracks annotations cameras"),
+           .dictionary = json_words("tours measures animTracks annotations cameras"),
            .change = change_json,
            .max_bytes = 65536},
           {.name = "film_wish",
@@ -225,7 +227,7 @@ std::vector<Target> scene_json_targets() {
            .seeds = sent_sidecar_seeds,
            .dictionary = json_words(
                "tours stops title caption autoplay fov_deg marker stay_s fly_s portal scene "
-               "position look_at orientation up"),
+               "position look_at orientation up measures marks error depth"),
            .change = change_json,
            .max_bytes = 65536}};
 }

@@ -90,6 +90,15 @@ TEST_F(Tours, SayWhatIsWrongInASidecar) {
   EXPECT_EQ(refused_field([&] { read(); }), "tours");
 }
 
+TEST_F(Tours, MeasuresAreServedWithAndWithoutTours) {
+  write("museum.json", R"({"measures": [{"marks": []}]})");
+  const CapturedLog log;
+  const auto read_back = read();
+  EXPECT_EQ(read_back["measures"].size(), 1u);
+  EXPECT_TRUE(read_back["tours"].is_null());
+  EXPECT_THAT(log.text(), HasSubstr("museum.json: measures[0].marks: has 0 entries"));
+}
+
 TEST_F(Tours, AreServedAndLoggedDespiteAMistake) {
   const CapturedLog log;
   const auto show = [&](const std::string& stop) {
@@ -226,6 +235,32 @@ TEST(SentSidecar, HasALargestSizeInEachRespect) {
   EXPECT_EQ(mistake(languages(33)), "tours[0].stops[0].translations");
   EXPECT_EQ(mistake(std::string((1 << 20) - 2, ' ') + "{}"), "");
   EXPECT_NE(mistake(std::string((1 << 20) - 1, ' ') + "{}"), "");
+}
+
+TEST(SentSidecar, MeasuresAreTakenOrRefusedByTheFieldThatIsWrong) {
+  const auto measures = [](std::size_t count, const std::string& measure) {
+    return fmt::format(R"({{"measures": [{}]}})", repeated(count, measure));
+  };
+  const auto marks = [](std::size_t count, const std::string& mark) {
+    return fmt::format(R"({{"title": "Door", "marks": [{}]}})", repeated(count, mark));
+  };
+  const std::string good = R"({"position": [1, 2, 3], "error": 0.02, "depth": [0, 0, 1]})",
+                    bad = "measures[0].marks";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {measures(64, marks(2, good)), ""},
+      {measures(65, marks(2, good)), "measures"},
+      {measures(1, marks(100, good)), ""},
+      {measures(1, marks(101, good)), bad},
+      {measures(1, marks(1, good)), bad},
+      {measures(1, "{}"), "measures[0]"},
+      {R"({"measures": {}})", "measures"},
+      {measures(1, R"({"titel": "x", "marks": []})"), "measures[0]"},
+      {measures(1, R"({"title": 7, "marks": []})"), "measures[0].title"},
+      {measures(1, marks(2, R"({"position": [1, 2]})")), bad + "[0].position"},
+      {measures(1, marks(2, R"({"position": [1, 2, 3], "error": -1})")), bad + "[0].error"},
+      {measures(1, marks(2, R"({"position": [1, 2, 3], "depth": 1})")), bad + "[0].depth"},
+      {measures(1, marks(2, R"({"at": [1, 2, 3]})")), bad + "[0]"}};
+  for (const auto& [json, field] : cases) EXPECT_EQ(mistake(json), field) << json;
 }
 
 TEST(SentSidecar, MediaAreRefusedByTheFieldThatIsWrong) {

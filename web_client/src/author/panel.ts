@@ -6,6 +6,8 @@ import { file_name_of, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
+import type { MeasureList } from '../tour/measure_list';
+import { without, type Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import { tours_for, type Tour } from '../tour/tour';
@@ -25,6 +27,7 @@ interface AuthorTools {
   /** The tours have changed. `edited`: index of the one that is edited; -1: it has no stops. */
   changed(tours: readonly Tour[], edited: number): void;
   readonly media: MediaFields;
+  readonly measures: MeasureList;
   /** Sets where visits begin, for this page; undefined: where they began before. */
   start_at(eye: Eye | undefined): void;
 }
@@ -45,6 +48,7 @@ export class AuthorPanel {
   private readonly done_ = by_id('author-done', HTMLOutputElement);
   private film_: FilmPanel | undefined;
   private token_: string | undefined;
+  private scene_id_: string | undefined; // of the draft
   private made_from_: SidecarTag;
   private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
   private start_: Eye | undefined; // as the page has heard
@@ -88,15 +92,17 @@ export class AuthorPanel {
 
   /**
    * `token`: lets its holder save the sidecar; undefined: this visitor may not save.
-   * `made_from`: the tag of the sidecar with these tours.
+   * `made_from`: the tag of the sidecar with these tours and measures. All measures are the author's own.
    */
   load(
     tours: readonly Tour[],
     about: SceneAbout,
     token: string | undefined,
     made_from: SidecarTag,
+    measures: readonly Measure[],
   ): void {
     this.token_ = token;
+    this.scene_id_ = this.tools_.navigation.scene_id;
     this.film_?.look();
     this.made_from_ = made_from;
     this.save_.hidden = token === undefined;
@@ -105,7 +111,9 @@ export class AuthorPanel {
     visits.href = `visits?scene=${encodeURIComponent(this.tools_.navigation.scene_id)}`;
     this.replace_.hidden = true;
     this.tools_.media.use(this.tools_.navigation.scene_id, token);
-    this.draft_.load(tours, about);
+    const own = [...without(this.tools_.measures.own, measures), ...measures];
+    this.draft_.load(tours, about, own);
+    this.tools_.measures.enter(own, []);
     this.language_.offer(tours);
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
@@ -161,6 +169,7 @@ export class AuthorPanel {
       this.told();
     });
     on_click('author-add', () => void this.add());
+    tools.measures.changed.listen((field) => this.measured(field));
     on_click('author-start', () => {
       draft.edit({ start: tools.navigation.eye });
       this.told();
@@ -310,6 +319,16 @@ export class AuthorPanel {
     where.scrollIntoView({ block: 'nearest' }); // an empty output is not displayed: nothing scrolls
   }
 
+  /** The measures have changed, which are edited in a panel of their own. */
+  private measured(field: string | undefined): void {
+    const { own: measures } = this.tools_.measures;
+    const { navigation } = this.tools_;
+    if (measures === this.draft_.state.measures || navigation.scene_id !== this.scene_id_) return;
+    this.draft_.edit({ measures }, field);
+    this.say('');
+    this.show_what_can_be_done();
+  }
+
   private edited(open_stop?: number): void {
     this.told();
     this.show(open_stop);
@@ -322,6 +341,9 @@ export class AuthorPanel {
     if (state.start !== this.start_) this.tools_.start_at(state.start);
     this.start_ = state.start;
     const { value: language } = this.language_;
+    this.tools_.measures.edit_language(language);
+    this.tools_.measures.set_scale(state.about.metres_per_unit || undefined);
+    if (state.measures !== this.tools_.measures.own) this.tools_.measures.load(state.measures);
     this.tools_.changed(tours_for(shown, language ? [language] : []), shown_index);
   }
 

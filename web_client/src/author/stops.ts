@@ -1,4 +1,5 @@
 import { make } from '../page/dom';
+import { number_in } from '../page/number_field';
 import { lasting_name } from '../portals/portals';
 import { scene_labels, type SceneListing } from '../session/scenes';
 import { number } from '../text/number';
@@ -121,28 +122,15 @@ export class AuthorStops {
       'aria-label': words.caption({ n }),
       title: words.markdown,
     });
-    const seconds = (
-      label: string,
-      value: number | undefined,
-      usual: string,
-      most: number,
-    ): HTMLInputElement =>
+    const seconds = (label: string, value: number | undefined, usual: string): HTMLInputElement =>
       make('input', {
-        type: 'number',
-        min: '0',
-        max: String(most),
-        step: 'any',
+        inputMode: 'decimal',
         placeholder: usual,
-        value: value === undefined ? '' : String(value),
+        value: value === undefined ? '' : number(value, { useGrouping: false }),
         'aria-label': words.of_stop({ field: label, n }),
       });
-    const stay = seconds(
-      words.stay,
-      stop.stay_s,
-      String(Math.round(default_stay_s(stop))),
-      longest_stay_s,
-    );
-    const flight = seconds(words.flight, stop.fly_s, words.automatic, longest_flight_s);
+    const stay = seconds(words.stay, stop.stay_s, number(Math.round(default_stay_s(stop))));
+    const flight = seconds(words.flight, stop.fly_s, words.automatic);
     const bind = (
       field: HTMLInputElement | HTMLTextAreaElement,
       name: string,
@@ -150,15 +138,14 @@ export class AuthorStops {
     ): void => {
       field.dataset['control'] = name;
       field.addEventListener('input', () => {
-        if (field.checkValidity()) this.actions_.change(i, read(), `${name} ${i}`);
+        const change = read();
+        if (field.checkValidity()) this.actions_.change(i, change, `${name} ${i}`);
       });
     };
-    const number_in = ({ value }: HTMLInputElement): number | undefined =>
-      value === '' ? undefined : Number(value);
     bind(title, 'title', () => ({ title: title.value }));
     bind(caption, 'caption', () => ({ caption: caption.value }));
-    bind(stay, 'stay', () => ({ stay_s: number_in(stay) }));
-    bind(flight, 'flight', () => ({ fly_s: number_in(flight) }));
+    bind(stay, 'stay', () => ({ stay_s: number_in(stay, 0, longest_stay_s) }));
+    bind(flight, 'flight', () => ({ fly_s: number_in(flight, 0, longest_flight_s) }));
     const times = make(
       'div',
       {},

@@ -3,6 +3,8 @@ import type { Eye } from '../camera/eye';
 import type { PageParts } from '../page/parts';
 import type { SceneListing } from '../session/scenes';
 import type { SceneAbout } from '../tour/draft';
+import type { MeasureList } from '../tour/measure_list';
+import type { Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
 import type { SidecarTag } from '../tour/save';
 import type { Tour } from '../tour/tour';
@@ -24,6 +26,7 @@ export class TourEditor {
   constructor(
     private readonly parts_: Pick<PageParts, 'navigation' | 'toolbar'>,
     tours: TourStage,
+    measures: MeasureList,
     scenes: () => Promise<readonly SceneListing[]>,
     media: MediaFields,
   ) {
@@ -44,6 +47,7 @@ export class TourEditor {
         player.choose(index);
       },
       media,
+      measures,
       start_at: (eye) => camera.start_at(eye ?? this.first_start_),
     });
     toolbar.keep_usable('author', () => this.panel_.is_unsaved);
@@ -56,9 +60,10 @@ export class TourEditor {
     about: SceneAbout,
     token: string | undefined,
     made_from: SidecarTag,
+    measures: readonly Measure[],
   ): void {
     this.first_start_ = this.parts_.navigation.camera.start;
-    this.panel_.load(tours, about, token, made_from);
+    this.panel_.load(tours, about, token, made_from, measures);
   }
 
   /** The scene has this scale from now on. */

@@ -38,6 +38,53 @@ export function project(
   return [0.5 + x / z / tan / aspect / 2, 0.5 + y / z / tan / 2];
 }
 
+type ViewPoint = readonly [x: number, y: number];
+
+/** The part of the line between two points that is in the view, as in ray_through(); undefined: none is. */
+export function visible_part(
+  from: Vec3,
+  to: Vec3,
+  eye: Eye,
+  aspect: number,
+): readonly [ViewPoint, ViewPoint] | undefined {
+  const ahead = rotate(eye.orientation, forward);
+  const [a, b] = [from, to].map((point) => dot(sub(point, eye.position), ahead)) as [
+    number,
+    number,
+  ];
+  const nearest = nearest_share * Math.max(a, b);
+  if (!(nearest > 0)) return undefined;
+  const cut = (point: Vec3, other: Vec3, depth: number): Vec3 =>
+    depth >= nearest
+      ? point
+      : add(point, scale(sub(other, point), (nearest - depth) / Math.abs(b - a)));
+  const [start, end] = [
+    project(cut(from, to, a), eye, aspect),
+    project(cut(to, from, b), eye, aspect),
+  ];
+  if (!start || !end) return undefined;
+  // Liang and Barsky: the part that is on the inner side of all four edges.
+  let [first, last] = [0, 1];
+  for (const axis of [0, 1] as const) {
+    const way = end[axis] - start[axis];
+    for (const [towards, room] of [
+      [-way, start[axis]],
+      [way, 1 - start[axis]],
+    ] as const) {
+      if (towards < 0) first = Math.max(first, room / towards);
+      else if (towards > 0) last = Math.min(last, room / towards);
+      else if (room < 0) return undefined;
+    }
+  }
+  if (first > last) return undefined;
+  const at = (share: number): ViewPoint => [
+    start[0] + share * (end[0] - start[0]),
+    start[1] + share * (end[1] - start[1]),
+  ];
+  return [at(first), at(last)];
+}
+const nearest_share = 1e-3; // of the depth of the line: what is behind the eye has no place in the view
+
 /** Which way a point is from the middle of the view: right and down, of length 1 (or 0: straight ahead). */
 export function direction_to(point: Vec3, eye: Eye): readonly [right: number, down: number] {
   const [x, y] = rotate(conjugate(eye.orientation), sub(point, eye.position));

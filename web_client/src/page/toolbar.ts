@@ -34,6 +34,14 @@ export class Toolbar {
       const open = panels.find((panel) => this.is_open(panel));
       if (open) this.close_beside(open);
     });
+    // A panel that grows may come over another one.
+    const grown = new ResizeObserver((entries) => {
+      for (const { target } of entries) {
+        const panel = panels.find((name) => element_of(name) === target);
+        if (panel && this.is_open(panel)) this.close_beside(panel);
+      }
+    });
+    for (const panel of panels) grown.observe(element_of(panel));
     by_id('button-full', HTMLButtonElement).hidden = !document.fullscreenEnabled;
     navigation_.changed.listen(() => show_mode(navigation_.camera.mode));
     this.bind_keys();

@@ -2,6 +2,7 @@
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
+import { write_measures, type Measure } from './measures';
 import { write_tours, type Stop, type Tour } from './tour';
 import { untranslated } from './words';
 
@@ -31,6 +32,7 @@ interface DraftState {
   readonly about: SceneAbout;
   /** Where the author lets visits begin; undefined: where they began before. */
   readonly start: Eye | undefined;
+  readonly measures: readonly Measure[];
 }
 
 const empty_tour: Tour = {
@@ -45,12 +47,12 @@ const most_undone = 200;
 /** Keeps each state of the draft, so that an author can take back every edit. */
 export class TourDraft {
   private states_: readonly DraftState[] = [
-    { ...first_of([]), about: nothing_said, start: undefined },
+    { ...first_of([]), about: nothing_said, start: undefined, measures: [] },
   ];
   private typed_in_: string | undefined; // the field of the last edit
 
-  load(tours: readonly Tour[], about: SceneAbout): void {
-    this.states_ = [{ ...first_of(tours), about, start: undefined }];
+  load(tours: readonly Tour[], about: SceneAbout, measures: readonly Measure[] = []): void {
+    this.states_ = [{ ...first_of(tours), about, start: undefined, measures }];
     this.typed_in_ = undefined;
   }
 
@@ -170,6 +172,7 @@ export class TourDraft {
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
     const { title, credits, licence, mode, background, metres_per_unit } = this.state.about;
     const { position, orientation } = scene.start_pose;
+    const measures = write_measures(this.state.measures);
     return {
       ...(title && { title }),
       ...(credits && { credits }),
@@ -183,6 +186,7 @@ export class TourDraft {
       ...(limited && { limits: { min: scene.limits_min, max: scene.limits_max } }),
       focus: scene.focus,
       tours: write_tours(this.shown),
+      ...(measures.length > 0 && { measures }),
     };
   }
 }

@@ -41,6 +41,13 @@ export class JsonField {
     return members.map(([name, value]) => [name, new JsonField(`${this.path_}.${name}`, value)]);
   }
 
+  /** Fails where a list has fewer elements. */
+  at_least(least: number): this {
+    const count = Array.isArray(this.value_) ? this.value_.length : 0;
+    if (count < least) this.fail(mistakes.too_few({ count, least }));
+    return this;
+  }
+
   /** The text, cut off at the limit. */
   text(): string {
     if (typeof this.value_ !== 'string') this.fail(mistakes.not_a_text);

@@ -1,18 +1,22 @@
 import { ask_server, scene_path } from '../base/server';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { read_measures, type Measure } from './measures';
 import { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 
 interface SceneTours {
   readonly tours: readonly Tour[];
   readonly start: Eye | undefined;
+  readonly measures: readonly Measure[];
+  readonly unread_measures: readonly string[];
   /** Errors for the author: parts that could not be read. */
   readonly problems: readonly string[];
 }
 
 interface TourDocument {
   readonly tours?: unknown;
+  readonly measures?: unknown;
   readonly settings?: unknown;
   /** Tag of the sidecar; null: there is none. */
   readonly etag?: string | null;
@@ -40,6 +44,7 @@ export function read_document(
     }
   };
   const own = attempt(document.tours, () => read_tours(document.tours, up, fov_y_rad));
+  const { measures, problems: unread_measures } = read_measures(document.measures);
   const imported = attempt(document.settings, () => read_supersplat(document.settings, aspect));
   return {
     tours: [
@@ -47,6 +52,8 @@ export function read_document(
       ...(imported?.tours ?? []).filter(({ way }) => own === undefined || way !== undefined),
     ].filter(({ stops, way }) => stops.length > 0 || way !== undefined),
     start: own === undefined ? imported?.start : undefined,
+    measures,
+    unread_measures,
     problems,
   };
 }

@@ -3,6 +3,7 @@ import { normalize, short_coordinate, unit, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { text } from '../text/text';
+import { add_to_link, type Measure } from './measures';
 
 export interface SharedView {
   readonly eye: Eye | undefined;
@@ -13,8 +14,13 @@ export interface SharedView {
   readonly stop_index: number | undefined;
 }
 
-/** The page's address with scene and view. It contains no token, because links are for others. */
-export function share_address(page_url: string, scene_id: string, view: SharedView): string {
+/** The page's address with scene, view and measures. It contains no token, because links are for others. */
+export function share_address(
+  page_url: string,
+  scene_id: string,
+  view: SharedView,
+  measures: readonly Measure[] = [],
+): string {
   const url = new URL(page_url);
   const parameters = new URLSearchParams();
   if (scene_id) parameters.set('scene', scene_id);
@@ -29,6 +35,7 @@ export function share_address(page_url: string, scene_id: string, view: SharedVi
   if (view.up) fragment.set('up', view.up.map((v) => String(Number(v.toPrecision(6)))).join(','));
   if (view.tour_index) fragment.set('tour', String(view.tour_index + 1));
   if (view.stop_index !== undefined) fragment.set('stop', String(view.stop_index + 1));
+  add_to_link(fragment, measures);
   url.hash = fragment.toString().replaceAll('%2C', ',');
   return url.href;
 }

@@ -133,7 +133,7 @@ function read_portal(portal: JsonField | undefined): Portal | undefined {
   };
 }
 
-function read_translations(item: JsonField): Pick<Worded, 'translations' | 'language'> {
+export function read_translations(item: JsonField): Pick<Worded, 'translations' | 'language'> {
   const written = item.find('translations')?.members(max_languages) ?? [];
   const translations = new Map(
     written.map(([tag, words]) => [
@@ -197,7 +197,7 @@ function write_portal({ scene, view, tour_index, stop_index }: Portal): object {
   };
 }
 
-function write_translations(translations: Worded['translations']): object {
+export function write_translations(translations: Worded['translations']): object {
   const written = [...translations].flatMap(([tag, { title, caption }]) =>
     title || caption
       ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const]

@@ -1,6 +1,7 @@
 import type { MediaFields } from '../author/stops';
 import { TourEditor } from '../author/tour_editor';
 import type { PageParts } from '../page/parts';
+import { MeasureList } from '../tour/measure_list';
 import { EmbedApi } from './embed';
 import { PortalScenes } from './portal_scenes';
 import { PortalTravel } from './portal_travel';
@@ -14,23 +15,28 @@ export function mount_tours(
   parts: PageParts,
   media: TourMediaPart,
   media_fields: MediaFields,
-): { readonly tours: SceneTours; readonly set_scale: TourEditor['set_scale'] | undefined } {
+): {
+  readonly tours: SceneTours;
+  readonly measures: MeasureList;
+  readonly set_scale: TourEditor['set_scale'] | undefined;
+} {
   const { navigation } = parts;
   const scenes = new PortalScenes(parts);
   const tours = new SceneTours(parts, scenes, media);
+  const measures = new MeasureList();
   const views = new SharedViews(parts, tours.player);
   const travel = new PortalTravel(parts, () => views.present);
   tours.portal_taken.listen(({ scene_id, portal }) => travel.enter(portal, scene_id));
   const is_author = new URLSearchParams(location.search).has('author');
   const editor = is_author
-    ? new TourEditor(parts, tours, () => scenes.list(), media_fields)
+    ? new TourEditor(parts, tours, measures, () => scenes.list(), media_fields)
     : undefined;
-  new SharePanel(parts, () => views.address);
+  new SharePanel(parts, measures, (shared) => views.address(shared));
   const { player } = tours;
   const embed = new EmbedApi({ player, navigation, put: (eye) => views.put(eye) });
   tours.shown.listen(({ stop_index, playing }) =>
     embed.say({ catgs: 'stop', stop: stop_index ?? null, playing }),
   );
-  new SceneEntry(parts, { scenes, tours, views, travel, editor, embed });
-  return { tours, set_scale: editor?.set_scale };
+  new SceneEntry(parts, { scenes, tours, views, travel, editor, embed, measures });
+  return { tours, measures, set_scale: editor?.set_scale };
 }

@@ -6,6 +6,8 @@ import { scene_name } from '../session/scenes';
 import { readers, text } from '../text/text';
 import type { SceneAbout } from '../tour/draft';
 import { fetch_tours, read_document } from '../tour/load';
+import type { MeasureList } from '../tour/measure_list';
+import { measures_for, measures_of_link, type Measure } from '../tour/measures';
 import { read_shared } from '../tour/share';
 import { tours_for } from '../tour/tour';
 import type { SceneFacts } from '../wire/wire';
@@ -23,6 +25,7 @@ interface EntryParts {
   readonly travel: PortalTravel;
   readonly editor: TourEditor | undefined; // of authors
   readonly embed: EmbedApi;
+  readonly measures: MeasureList;
 }
 
 export class SceneEntry {
@@ -40,16 +43,24 @@ export class SceneEntry {
       const shared = read_shared(location.href);
       views.show(shared);
       views.show_stop(shared);
+      const linked = measures_of_link(location.href);
+      this.show_linked(linked.measures);
+      this.say_unread(linked.problems);
     });
   }
 
   private async enter(scene: SceneFacts): Promise<void> {
     const scene_id = scene.sceneId;
     const { navigation, view, notice, toolbar } = this.page_;
-    const { scenes, tours: shown, views, travel, editor, embed } = this.parts_;
+    const { scenes, tours: shown, views, travel, editor, embed, measures: list } = this.parts_;
     const token = this.page_.token.value;
     const load = ++this.loads_;
-    const shared = travel.arrive(scene_id) ?? read_shared(location.href);
+    const arrival = travel.arrive(scene_id);
+    const shared = arrival ?? read_shared(location.href);
+    const linked = measures_of_link(arrival ? location.origin : location.href);
+    list.enter([], []);
+    list.set_scale(scene.metresPerUnit || undefined);
+    this.show_linked(linked.measures);
     views.show(shared);
     if (scene.upIsDoubtful && !navigation.chosen_up)
       notice.show(text.quality.up_doubtful, 20, {
@@ -60,10 +71,12 @@ export class SceneEntry {
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;
     const aspect = view.clientWidth / Math.max(1, view.clientHeight);
-    const { tours, start, problems } = read_document(document, camera.up, camera.fov_y_rad, aspect);
+    const read = read_document(document, camera.up, camera.fov_y_rad, aspect);
+    const { tours, start, problems, measures } = read;
     await scenes.learn(tours);
     if (load !== this.loads_) return;
     for (const problem of problems) notice.show(text.tour.unreadable({ why: problem }));
+    this.say_unread([...read.unread_measures, ...linked.problems]);
     if (start) {
       camera.start_at(start);
       if (!shared.eye && !navigation.led) navigation.reset();
@@ -71,7 +84,9 @@ export class SceneEntry {
     // Authors see each text in the language that they edit.
     const readable = tours_for(tours, editor ? [] : readers);
     shown.offer(readable);
-    editor?.load(tours, about_of(scene), may_save ? token : undefined, document.etag);
+    if (editor)
+      editor.load(tours, about_of(scene), may_save ? token : undefined, document.etag, measures);
+    else list.enter(list.own, measures_for(measures, readers));
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const has_view = shared.eye !== undefined || shared.stop_index !== undefined;
     shown.player.load(readable, has_view || editor !== undefined || navigation.led);
@@ -80,6 +95,17 @@ export class SceneEntry {
     travel.arrived();
     const stops = (readable[0]?.stops ?? []).map(({ title }) => title);
     embed.say({ catgs: 'ready', scene: scene_name(scene_id), stops });
+  }
+
+  private say_unread(problems: readonly string[]): void {
+    for (const why of problems) this.page_.notice.show(text.measure.unreadable({ why }));
+  }
+
+  private show_linked(linked: readonly Measure[]): void {
+    if (linked.length === 0) return;
+    this.parts_.measures.join(linked);
+    // Frames of other pages have no panels.
+    if (!document.body.classList.contains('bare')) this.page_.toolbar.open('measure');
   }
 }
 

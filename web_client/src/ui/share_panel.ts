@@ -2,6 +2,8 @@ import { by_id, make, on_click, save_file } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { file_name_of } from '../session/scenes';
 import { text as words } from '../text/text';
+import type { MeasureList } from '../tour/measure_list';
+import { has_length, type Measure } from '../tour/measures';
 import { embed_code, frame_sites } from '../tour/share';
 
 /** The panel with a link, code for other pages, and a picture to save. */
@@ -9,16 +11,19 @@ export class SharePanel {
   private readonly link_ = by_id('share-link', HTMLInputElement);
   private readonly done_ = by_id('share-done', HTMLOutputElement);
   private readonly token_ = by_id('share-token', HTMLElement);
+  private readonly with_measures_ = by_id('share-with-measures', HTMLInputElement);
   private readonly frames_ = by_id('share-frames', HTMLElement);
 
-  /** `address`: a link to the present view. */
+  /** `address`: a link to the present view with these measures. */
   constructor(
     private readonly parts_: Pick<PageParts, 'worker' | 'navigation' | 'toolbar' | 'token'>,
-    private readonly address_: () => string,
+    private readonly measures_: MeasureList,
+    private readonly address_of_: (measures: readonly Measure[]) => string,
   ) {
-    on_click('share-copy', () => void this.hand_over(address_(), words.share.link_copied));
+    this.with_measures_.addEventListener('change', () => (this.link_.value = this.address));
+    on_click('share-copy', () => void this.hand_over(this.address, words.share.link_copied));
     on_click('share-embed', () => {
-      void this.hand_over(embed_code(address_()), words.share.code_copied);
+      void this.hand_over(embed_code(this.address), words.share.code_copied);
       void this.tell_of_frames();
     });
     on_click('share-picture', () => void this.save_picture());
@@ -28,8 +33,13 @@ export class SharePanel {
     });
   }
 
+  private get address(): string {
+    return this.address_of_(this.with_measures_.checked ? this.measures_.own : []);
+  }
+
   private show(): void {
-    this.link_.value = this.address_();
+    by_id('share-measures', HTMLElement).hidden = !this.measures_.own.some(has_length);
+    this.link_.value = this.address;
     this.done_.textContent = '';
     this.token_.hidden = this.parts_.token.value === '';
     this.frames_.hidden = true;

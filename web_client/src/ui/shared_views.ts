@@ -2,6 +2,7 @@
 import type { Eye } from '../camera/eye';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
+import type { Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
 import { share_address, type SharedView } from '../tour/share';
 
@@ -18,9 +19,9 @@ export class SharedViews {
     return { eye: camera.eye, mode: camera.mode, up: chosen_up, tour_index, stop_index };
   }
 
-  /** A link to it. */
-  get address(): string {
-    return share_address(location.href, this.parts_.navigation.scene_id, this.present);
+  /** A link to it, with these measures. */
+  address(measures: readonly Measure[]): string {
+    return share_address(location.href, this.parts_.navigation.scene_id, this.present, measures);
   }
 
   /** Up, mode and camera of a shared view. */

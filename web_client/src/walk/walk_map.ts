@@ -1,5 +1,6 @@
 // The walkable area of a scene: a `.walk` file (render_core/walk/walk_file.h).
 import { Breaths } from '../base/breaths';
+import { crc32 } from '../base/crc32';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
 import {
   column_in_tile,
@@ -162,22 +163,6 @@ export async function block_around(
       }
   }
   return east > 0 ? { west, south, east, north } : undefined;
-}
-
-/** CRC-32 of ISO 3309, four bits at a time. */
-function crc32(bytes: Uint8Array): number {
-  const table = new Uint32Array(16);
-  for (let k = 0; k < 16; ++k) {
-    let rest = k;
-    for (let bit = 0; bit < 4; ++bit) rest = rest & 1 ? (rest >>> 1) ^ 0xedb88320 : rest >>> 1;
-    table[k] = rest;
-  }
-  let crc = 0xffffffff;
-  for (const byte of bytes) {
-    crc = (crc >>> 4) ^ table[(crc ^ byte) & 15]!;
-    crc = (crc >>> 4) ^ table[(crc ^ (byte >>> 4)) & 15]!;
-  }
-  return ~crc >>> 0;
 }
 
 /** Throws an Error that names the field that is wrong, of the header or of any tile. Lets the page draw meanwhile. */

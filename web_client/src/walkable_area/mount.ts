@@ -8,6 +8,8 @@ import { is_for_page } from '../input/key';
 import { by_id } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
+import { file_name_of } from '../session/scenes';
+import type { MeasureList } from '../tour/measure_list';
 import type { TourState } from '../tour/player';
 import type { Stand, WalkMap } from '../walk/walk_map';
 import type { Dollhouse } from './dollhouse';
@@ -21,6 +23,8 @@ interface WalkableAreaParts extends PageParts {
   readonly go_to_stop: (index: number) => void;
   /** Of authors. */
   readonly set_scale: ((metres_per_unit: number) => void) | undefined;
+  /** They know the scale of the scene. */
+  readonly measures: MeasureList;
 }
 
 const warn = (error: unknown): void => console.warn('the walkable area cannot be used', error); // the server is away
@@ -43,7 +47,7 @@ export class WalkableArea {
   private idle_ = false;
 
   constructor(private readonly parts_: WalkableAreaParts) {
-    const { navigation, worker, toolbar, seen, token, notice, tour_shown } = parts_;
+    const { navigation, worker, toolbar, seen, token, notice, tour_shown, measures } = parts_;
     this.loader_ = new WalkMapLoader(token);
     this.eye_ = navigation.eye;
     navigation.entered.listen(({ scene }) => {
@@ -80,6 +84,7 @@ export class WalkableArea {
       this.tour_ = state;
       this.show_stops();
     });
+    measures.changed.listen(() => this.plan_?.show_scale());
     worker.on('presented', () => this.presented());
     this.loader_.computing.listen(() => notice.show(text.floor_plan.preparing, 10));
     this.loader_.known.listen((map) => {
@@ -183,6 +188,8 @@ export class WalkableArea {
         go_to_stop: parts.go_to_stop,
         dollhouse: this.house_,
         stand_at: (position) => walking.walker.stand_at(position),
+        measures: parts.measures,
+        scene_name: file_name_of(parts.navigation.scene_id),
       },
       map,
       this.eye_,

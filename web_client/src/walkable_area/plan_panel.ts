@@ -2,11 +2,14 @@
 import type { KeptTexts } from '../base/browser_storage';
 import { dot, forward, length, rotate, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
-import { by_id, icon, make } from '../page/dom';
+import { kept_system } from '../measure/units';
+import { by_id, icon, make, save_file } from '../page/dom';
 import { number } from '../text/number';
 import { text } from '../text/text';
+import type { MeasureList } from '../tour/measure_list';
 import type { Stop } from '../tour/tour';
 import { clear_near } from '../walk/map_walker';
+import { areas_of } from '../walk/rooms';
 import { height_of } from '../walk/tiles';
 import {
   cells_per_eye_height,
@@ -18,7 +21,15 @@ import {
 } from '../walk/walk_map';
 import { stand_below } from '../walk/walker';
 import type { Dollhouse } from './dollhouse';
+import {
+  draw_areas,
+  draw_floor,
+  draw_scale_bar,
+  type DrawnPlan,
+  type PlanScale,
+} from './plan_drawing';
 import { plan_picture, type PlanPicture } from './plan_picture';
+import { area_of_storey, plan_png } from './plan_sheet';
 import { cells_of, px_of, type PlanView } from './plan_view';
 import './floor_plan.css';
 
@@ -27,6 +38,7 @@ const small_cells = 14 * cells_per_eye_height; // across the small map
 const margin_cells = 4;
 const dot_px = 6;
 const cone_px = 34;
+const font_px = 12;
 const unknown = '#c7cfd9';
 const accent = '#1f6feb';
 const participant_colour = '#b3477d';
@@ -40,11 +52,9 @@ interface PlanParts {
   readonly dollhouse: Dollhouse | undefined;
   /** Where somebody would stand whose eyes are here. */
   readonly stand_at: (position: Vec3) => Stand;
-}
-
-interface DrawnPlan {
-  readonly picture: PlanPicture;
-  readonly canvas: HTMLCanvasElement;
+  readonly measures: Pick<MeasureList, 'metres_per_unit'>;
+  /** For files. */
+  readonly scene_name: string;
 }
 
 export class PlanPanel {
@@ -67,7 +77,18 @@ export class PlanPanel {
     { type: 'button', title: text.floor_plan.dollhouse, 'aria-label': text.floor_plan.dollhouse },
     icon('dollhouse'),
   );
+  private readonly print_ = make(
+    'button',
+    {
+      type: 'button',
+      className: 'plan-print',
+      title: text.floor_plan.print,
+      'aria-label': text.floor_plan.print,
+    },
+    icon('print'),
+  );
   private readonly size_ = make('button', { type: 'button' });
+  private readonly words_ = make('p');
   private readonly pictures_ = new Map<number, DrawnPlan | 'comes'>();
   private storey_ = 0;
   private visitors_storey_: number | undefined;
@@ -86,7 +107,16 @@ export class PlanPanel {
     this.picture_.append(this.canvas_, this.spots_);
     this.host_.replaceChildren(
       this.picture_,
-      make('div', { className: 'row' }, this.storeys_, this.house_, this.view_up_, this.size_),
+      this.words_,
+      make(
+        'div',
+        { className: 'row' },
+        this.storeys_,
+        this.print_,
+        this.house_,
+        this.view_up_,
+        this.size_,
+      ),
     );
     this.storeys_.hidden = map_.storeys.length < 2;
     this.storeys_.append(
@@ -106,6 +136,7 @@ export class PlanPanel {
       this.draw_soon();
     });
     this.size_.addEventListener('click', () => this.set_large(!this.is_large));
+    this.print_.addEventListener('click', () => void this.print());
     this.bind_dollhouse(parts_.dollhouse);
     this.canvas_.addEventListener('click', ({ offsetX, offsetY }) =>
       this.clicked(offsetX, offsetY),
@@ -152,6 +183,11 @@ export class PlanPanel {
       return { stop, stand: this.parts_.stand_at(stop.eye.position), button };
     });
     this.spots_.replaceChildren(...this.stops_.map(({ button }) => button));
+  }
+
+  /** The scale of the scene or the visitor's units have changed. */
+  show_scale(): void {
+    this.draw_soon();
   }
 
   /** Where the eyes of other visitors are, in the world. */
@@ -233,12 +269,15 @@ export class PlanPanel {
 
   private async make_picture(storey: number): Promise<void> {
     this.pictures_.set(storey, 'comes');
-    const picture = await plan_picture(this.map_, storey);
+    const [picture, areas] = await Promise.all([
+      plan_picture(this.map_, storey),
+      areas_of(this.map_, storey, this.parts_.dollhouse !== undefined),
+    ]);
     const canvas = make('canvas', { width: picture.width, height: picture.height });
     canvas
       .getContext('2d')
       ?.putImageData(new ImageData(picture.rgba, picture.width, picture.height), 0, 0);
-    this.pictures_.set(storey, { picture, canvas });
+    this.pictures_.set(storey, { picture, canvas, areas });
     this.draw_soon();
   }
 
@@ -285,23 +324,32 @@ export class PlanPanel {
     const made = this.picture_of(this.storey_);
     this.picture_.setAttribute('aria-busy', String(!made));
     if (!made) return;
-    const { picture, canvas: plan } = made;
-    const view = this.view_of(picture);
+    const view = this.view_of(made.picture);
     this.drawn_ = view;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.save();
-    const scale = view.px_per_cell * picture.cells;
-    context.imageSmoothingEnabled = scale * ratio < 1.5;
-    const [left, top] = px_of(view, picture.east, picture.north + picture.height * picture.cells);
-    context.translate(left, top);
-    context.rotate(-view.up_rad);
-    context.scale(scale, scale);
-    context.drawImage(plan, 0, 0);
-    context.restore();
+    draw_floor(context, made, view);
+    if (this.is_large) draw_areas(context, made, view, this.scale, font_px);
+    draw_scale_bar(context, view, this.scale, font_px);
+    const area = area_of_storey(made.areas.cells, this.scale);
+    this.words_.textContent = `${area} · ${text.floor_plan.sketch}`;
     for (const position of this.participants_)
       if (this.is_beside(position)) this.draw_dot(context, view, position, participant_colour);
     if (this.storey_ === this.visitors_storey_) this.draw_visitor(context, view);
     this.place_stops(view);
+  }
+
+  private get scale(): PlanScale {
+    const { measures, storage } = this.parts_;
+    const { metres_per_unit } = measures;
+    return { metres_per_unit, system: kept_system(storage), cell: this.map_.cell };
+  }
+
+  private async print(): Promise<void> {
+    const plan = this.picture_of(this.storey_);
+    if (!plan) return; // it is not drawn yet
+    const storey = text.floor_plan.storey_numbered({ n: this.storey_ + 1 });
+    const png = await plan_png(plan, storey, this.scale);
+    if (png) save_file(png, `${this.parts_.scene_name}-${this.storey_ + 1}.png`);
   }
 
   /** Whether somebody's eyes there are in this storey, and not where the visitor is. */

@@ -137,6 +137,17 @@ TEST(EditScene, OnlyPlacingAndCroppingWorkOnParts) {
   EXPECT_FALSE(SceneEdit{.merge_fraction = 0.5}.works_on_parts());
 }
 
+TEST(TourPlaces, MeasuresMoveAndTheirErrorsGrowWithTheScene) {
+  auto fields = nlohmann::ordered_json::parse(
+      R"({"measures": [{"title": "Door", "marks": [{"position": [1, 2, 3], "error": 0.25, "depth": [1, 0, 2]}]}]})");
+  place_tours(fields, Placement{2.0, {0, 0, 0, 1}, {10, 0, 0}});  // half a turn about z
+  const auto& mark = fields["measures"][0]["marks"][0];
+  EXPECT_EQ(mark.at("position"), nlohmann::ordered_json({8.0, -4.0, 6.0}));
+  EXPECT_EQ(mark.at("error"), 0.5);
+  EXPECT_EQ(mark.at("depth"), nlohmann::ordered_json({-2.0, 0.0, 4.0}));
+  EXPECT_EQ(fields["measures"][0]["title"], "Door");
+}
+
 TEST(TourPlaces, StopsMoveAndTurnWithTheScene) {
   auto tours = nlohmann::ordered_json::parse(R"([{"title": "Way", "stops": [
     {"position": [1, 2, 3], "look_at": [0, 0, 4], "marker": [1, 0, 0], "fov_deg": 60},

@@ -18,8 +18,8 @@ class ToursOnDisk : public FolderTest {
   /// The mistake in `content` of the sidecar, without the part that all warnings begin with.
   std::string mistake_in(const std::string& content) {
     const auto path = write("hall.json", content);
-    const std::string warning = mistake_in_tours({path, {}, {}}).value_or("");
-    const std::string start = std::string(faulty_tours) + path.string() + ": ";
+    const std::string warning = mistake_for_pages({path, {}, {}}).value_or("");
+    const std::string start = std::string(faulty_for_pages) + path.string() + ": ";
     EXPECT_TRUE(warning.empty() || warning.starts_with(start)) << warning;
     return warning.substr(std::min(start.size(), warning.size()));
   }
@@ -30,9 +30,9 @@ class ToursOnDisk : public FolderTest {
   }
 };
 
-// tests/server/scenes/tours_test.cpp tests what check_tours() finds, as authors meet it.
+// tests/server/scenes/tours_test.cpp tests what check_page_fields() finds, as authors meet it.
 TEST_F(ToursOnDisk, MistakesNameFileAndField) {
-  EXPECT_FALSE(mistake_in_tours({folder_ / "hall.json", {}, {}}));
+  EXPECT_FALSE(mistake_for_pages({folder_ / "hall.json", {}, {}}));
   EXPECT_EQ(mistake(""), "");
   EXPECT_THAT(mistake(R"(, "titel": "Door")"), StartsWith("tours[0].stops[0]: "));
   EXPECT_THAT(mistake_in("{ broken"), StartsWith("byte "));

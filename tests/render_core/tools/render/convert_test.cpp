@@ -79,7 +79,8 @@ TEST_F(Convert, TurnsAboutXThenYThenZ) {
 TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
   std::ofstream(path("ball.json")) << R"({
     "start_pose": {"position": [0, 0, -4], "look_at": [0, 0, 0]}, "near": 0.125, "title": "Ball",
-    "tours": [{"title": "Way", "stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0]}]}]})";
+    "tours": [{"title": "Way", "stops": [{"position": [1, 0, 0], "look_at": [0, 0, 0]}]}],
+    "measures": [{"marks": [{"position": [1, 0, 0], "error": 0.5}, {"position": [0, 0, 0]}]}]})";
   folder_.write("ball.media/door.vtt", "WEBVTT");
   folder_.write("ball.media/hall.vtt", "WEBVTT");
   folder_.write("moved.media/hall.vtt", "there before");
@@ -97,6 +98,9 @@ TEST_F(Convert, MovesSidecarAndToursWithTheScene) {
   EXPECT_EQ(sidecar.at("near"), 0.25);
   EXPECT_EQ(sidecar.at("title"), "Ball");
   EXPECT_EQ(sidecar.at("tours")[0].at("stops")[0].at("position"), nlohmann::json({2.0, 10.0, 0.0}));
+  const auto& mark = sidecar.at("measures")[0].at("marks")[0];
+  EXPECT_EQ(mark.at("position"), nlohmann::json({2.0, 10.0, 0.0}));
+  EXPECT_EQ(mark.at("error"), 1.0);
   EXPECT_EQ(info("moved.spz").at("hints").at("near"), 0.25);
   // The input's own sidecar would serve this output, too.
   const Outcome shared = convert("ball.sog", moves);
