@@ -19,7 +19,7 @@ RequestHandlers::RequestHandlers(Parts around)
       scenes(parts.scenes, parts.authorize),
       media({parts.scenes, parts.background,
              [this](std::string_view token_id) { return parts.access.ended(token_id); },
-             parts.access.own_key(), unix_now_s}),
+             SessionTokens(parts.access.own_key()), unix_now_s}),
       saver(parts.scenes, parts.background, parts.io, parts.config.media_origins),
       films({parts.io, parts.background,
              [this](const auto& id, bool again) { return parts.scenes.lease(id, again); },

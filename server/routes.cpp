@@ -49,7 +49,8 @@ HttpResponse scene_list(RequestHandlers& handlers, const RouteRequest& request) 
 }
 
 HttpResponse scene_tours(RequestHandlers& handlers, const RouteRequest& request) {
-  return handlers.scenes.tours(request.scene_id, request.permit);
+  return handlers.scenes.tours(
+      request.scene_id, !request.has_pass && request.permit.allows(request.scene_id, Use::save));
 }
 
 HttpResponse scene_poster(RequestHandlers& handlers, const RouteRequest& request) {
@@ -204,7 +205,7 @@ constexpr auto public_table = std::to_array<Route>({
     {get, media_files, no_body, see_or_pass, media_file},
     {put, media_files, max_media_bytes, save, {save_media, refuse_media}},
     {get, "/api/scenes", no_body, none, scene_list},
-    {get, "/api/scenes/{scene...}/tours", no_body, see, scene_tours},
+    {get, "/api/scenes/{scene...}/tours", no_body, see_or_pass, scene_tours},
     {get, "/api/scenes/{scene...}/poster.jpg", no_body, see, scene_poster},
     {get, "/api/scenes/{scene...}/walk", no_body, see, walkable_area},
     {put, "/api/scenes/{scene...}/sidecar", max_sent_sidecar_bytes, save, save_sidecar},

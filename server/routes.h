@@ -23,7 +23,7 @@ struct RouteRequest {
   PathParts parts{};       // what the route's path names, in its order
   std::string scene_id{};  // empty: the path names no scene
   Permit permit{};         // of its token; of a path without a scene, or with a pass: empty
-  bool has_pass = false;   // to the scene's media
+  bool has_pass = false;   // to the scene's tours and media
 };
 
 struct Upload {
@@ -35,7 +35,7 @@ struct Upload {
 enum class Right {
   none,  // the path names no scene
   see,
-  see_or_pass,  // a pass to the scene's media does as well
+  see_or_pass,  // a pass to the scene's tours and media does as well
   save,
 };
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <glm/vec3.hpp>
 
@@ -12,6 +13,15 @@ namespace catgs {
 
 /// How a visitor moves at first.
 enum class CameraMode { unspecified, orbit, fly, walk };
+
+/// What is said of a scene in one language, by its BCP 47 tag.
+struct SceneWords {
+  std::string language{};
+  std::string title{};    // empty: as for all others
+  std::string credits{};  // likewise
+
+  bool operator==(const SceneWords&) const = default;
+};
 
 /// A scene's author says this about it to visitors. The texts are printable UTF-8; empty: not said.
 struct SceneAbout {
@@ -21,6 +31,7 @@ struct SceneAbout {
   CameraMode mode = CameraMode::unspecified;
   std::uint32_t background_rgb = 0;  // 0xRRGGBB, sRGB: shows where no Gaussian is
   float metres_per_unit = 0.0f;      // of world units; 0: not said
+  std::vector<SceneWords> translations{};
 
   bool operator==(const SceneAbout&) const = default;
 };

@@ -112,12 +112,24 @@ struct Prepare {
 struct Ping {
   glm::vec3 place{0.0f};
 };
+/// The client wants to know which of these points the scene hides from its camera.
+struct Markers {
+  std::uint32_t id = 0;
+  std::vector<glm::vec3> points;
+};
+inline constexpr int max_markers = 256;
+/// What a visitor sees of the scene's tours. Numbers count from 1; 0: none.
+struct Show {
+  std::uint32_t tour = 0, stop = 0;
+  bool arrived = false;  // the camera is at the stop
+  bool operator==(const Show&) const = default;
+};
 /// A message of a newer wire version. It is ignored, as the contract demands.
 struct UnknownMessage {};
 
-using ClientMessage =
-    std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings, SelectScene,
-                 RequestIdr, Pause, Bye, Pick, Present, Follow, Reached, Prepare, Ping, ClipPlane>;
+using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
+                                   SelectScene, RequestIdr, Pause, Bye, Pick, Present, Follow,
+                                   Reached, Prepare, Ping, ClipPlane, Markers, Show>;
 
 struct SceneFacts {
   std::string scene_id;
@@ -159,6 +171,7 @@ struct Welcome {
   std::string watch_token;
   bool watching = false;
   bool may_leave = false;
+  std::string scene_pass;
 };
 
 struct Stats {
@@ -248,6 +261,12 @@ struct Picked {
   float spread = 0.0f;            // of the distance
 };
 
+/// The markers that something covers, as indices into Markers::points, in order.
+struct HiddenMarkers {
+  std::uint32_t id = 0;
+  std::vector<std::uint32_t> indices;
+};
+
 enum class LeadState { leads, away, ended };
 
 struct Lead {
@@ -257,6 +276,7 @@ struct Lead {
   std::optional<PoseSample> camera;  // to followers
   bool may_ping = false;             // followers may
   bool elsewhere = false;            // of ended: the leader is in another scene
+  Show shown{};                      // by the leader
 };
 
 struct Pinged {
@@ -271,7 +291,8 @@ struct Participants {
 };
 inline constexpr std::size_t most_told_places = 64;
 
-using ServerMessage = std::variant<Welcome, QueuePosition, StreamConfig, Stats, Heartbeat,
-                                   ErrorMessage, Drain, Picked, Lead, Pinged, Participants>;
+using ServerMessage =
+    std::variant<Welcome, QueuePosition, StreamConfig, Stats, Heartbeat, ErrorMessage, Drain,
+                 Picked, Lead, Pinged, Participants, HiddenMarkers>;
 
 }  // namespace catgs

@@ -59,6 +59,12 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
     origin.set_y(scene.origin.y);
     origin.set_z(scene.origin.z);
   }
+  for (const SceneWords& words : scene.about.translations) {
+    auto& message = *out.add_translations();
+    message.set_language(words.language);
+    message.set_title(words.title);
+    message.set_credits(words.credits);
+  }
   if (scene.model != SplatModel::standard) out.set_model(std::string(name_of(scene.model)));
 }
 
@@ -75,6 +81,7 @@ void fill(const Welcome& welcome, v1::ServerMessage& out) {
   message.set_watch_token(welcome.watch_token);
   message.set_watching(welcome.watching);
   message.set_may_leave(welcome.may_leave);
+  message.set_scene_pass(welcome.scene_pass);
 }
 
 void fill(const QueuePosition& place, v1::ServerMessage& out) {
@@ -138,6 +145,12 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   message.set_company(static_cast<std::uint32_t>(lead.participants));
   message.set_may_ping(lead.may_ping);
   message.set_elsewhere(lead.elsewhere);
+  if (lead.shown != Show{}) {
+    auto& shown = *message.mutable_shown();
+    shown.set_tour(lead.shown.tour);
+    shown.set_stop(lead.shown.stop);
+    shown.set_arrived(lead.shown.arrived);
+  }
   if (!lead.camera) return;
   auto& camera = *message.mutable_camera();
   camera.set_pose_id(lead.camera->pose_id);
@@ -155,6 +168,12 @@ void fill(const Pinged& pinged, v1::ServerMessage& out) {
 void fill(const Participants& participants, v1::ServerMessage& out) {
   auto& message = *out.mutable_company();
   for (const glm::vec3& place : participants.positions) fill(place, *message.add_places());
+}
+
+void fill(const HiddenMarkers& hidden, v1::ServerMessage& out) {
+  auto& message = *out.mutable_hidden_markers();
+  message.set_id(hidden.id);
+  message.mutable_indices()->Add(hidden.indices.begin(), hidden.indices.end());
 }
 
 template <typename Body>
@@ -175,6 +194,8 @@ template <>
 constexpr Topic topic_of<Pinged> = Topic::ping;
 template <>
 constexpr Topic topic_of<Participants> = Topic::participants;
+template <>
+constexpr Topic topic_of<HiddenMarkers> = Topic::markers;
 
 std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(to - from).count();

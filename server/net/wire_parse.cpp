@@ -182,6 +182,14 @@ ClipPlane parse(const v1::Clip& message) {
   return plane.normal == glm::vec3(0.0f) ? ClipPlane{} : plane;
 }
 
+Markers parse(const v1::Markers& message) {
+  checked("markers.points count", message.points_size(), 0, max_markers);
+  Markers markers{message.id(), {}};
+  for (const auto& point : message.points())
+    markers.points.push_back(parse("markers.points", point));
+  return markers;
+}
+
 ClientMessage parse(const v1::ClientMessage& message) {
   switch (message.body_case()) {
     case v1::ClientMessage::kHello:
@@ -221,6 +229,12 @@ ClientMessage parse(const v1::ClientMessage& message) {
       return Ping{parse("ping.place", message.ping().place())};
     case v1::ClientMessage::kClip:
       return parse(message.clip());
+    case v1::ClientMessage::kMarkers:
+      return parse(message.markers());
+    case v1::ClientMessage::kShow:
+      return Show{checked("show.tour", message.show().tour(), 0u, most_tours),
+                  checked("show.stop", message.show().stop(), 0u, most_stops),
+                  message.show().arrived()};
     case v1::ClientMessage::BODY_NOT_SET:
       break;
   }

@@ -57,7 +57,8 @@ enum class Topic : std::uint8_t {
   clock,
   leader,
   ping,
-  participants
+  participants,
+  markers
 };
 
 /// A serialised message on its way to the socket.

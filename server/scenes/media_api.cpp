@@ -1,14 +1,12 @@
 #include "server/scenes/media_api.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
-#include "server/access/signed_token.h"
 #include "server/base/log_event.h"
 #include "server/base/replace_file.h"
 #include "server/net/byte_range.h"
@@ -17,8 +15,6 @@
 namespace catgs {
 namespace {
 
-constexpr std::string_view pass_purpose = "catgs-media-v1";
-constexpr std::int64_t pass_valid_s = 4 * 3600;
 /// The policy of a file that somebody opens by its address. Such a file can do nothing at all.
 constexpr std::string_view file_policy = "default-src 'none'; sandbox";
 
@@ -90,30 +86,18 @@ std::optional<MediaFolder> MediaApi::folder_of(std::string_view scene_id) const 
   return MediaFolder(found->sidecar);
 }
 
-/// A pass says: the scene, when it ends, and the id of the token that it was made for.
 bool MediaApi::has_pass(const HttpRequest& request, std::string_view scene_id) const {
   constexpr std::string_view argument = "pass=";
-  for (const std::string& text : request.arguments) {
-    if (!text.starts_with(argument)) continue;
-    const auto pass =
-        read_signed_token(pass_purpose, std::string_view(text).substr(argument.size()), parts_.key);
-    if (!pass || !pass->starts_with(std::string(scene_id) + "\n")) return false;
-    const std::string_view rest = std::string_view(*pass).substr(scene_id.size() + 1);
-    std::int64_t end_s = 0;
-    const auto [stop, error] = std::from_chars(rest.data(), rest.data() + rest.size(), end_s);
-    const std::string_view token = rest.substr(static_cast<std::size_t>(stop - rest.data()));
-    if (error != std::errc() || !token.starts_with('\n') || parts_.now_unix_s() >= end_s)
-      return false;
-    return !parts_.ended(token.substr(1));
-  }
-  return false;
+  const auto text = std::ranges::find_if(
+      request.arguments, [&](const std::string& given) { return given.starts_with(argument); });
+  if (text == request.arguments.end()) return false;
+  const auto token = parts_.tokens.read_scene_pass(std::string_view(*text).substr(argument.size()),
+                                                   scene_id, parts_.now_unix_s());
+  return token && !parts_.ended(*token);
 }
 
 HttpResponse MediaApi::make_pass(const std::string& scene_id, const Permit& permit) const {
-  const std::int64_t end_s = std::min(parts_.now_unix_s() + pass_valid_s, permit.expires_unix_s);
-  return text_response(
-      200, sign_token(pass_purpose, fmt::format("{}\n{}\n{}", scene_id, end_s, permit.token_id),
-                      parts_.key));
+  return text_response(200, parts_.tokens.scene_pass(scene_id, permit, parts_.now_unix_s()));
 }
 
 HttpResponse MediaApi::list(const std::string& scene_id) const {

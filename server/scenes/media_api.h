@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "server/access/authorize.h"
+#include "server/access/session_tokens.h"
 #include "server/base/background.h"
 #include "server/media/media_folder.h"
 #include "server/net/http.h"
@@ -26,16 +27,14 @@ class MediaApi {
     const SceneLibrary& scenes;
     Background& background;
     Ended ended;
-    std::string key;  // of passes; servers of a fleet share it
+    SessionTokens tokens;
     std::function<std::int64_t()> now_unix_s;
   };
   explicit MediaApi(Parts parts) : parts_(std::move(parts)), jobs_(parts_.background) {}
 
-  /// True if the address has a pass to the scene's media: "?pass=PASS". Elements of a page cannot
-  /// send a token.
+  /// True if the address has a pass to the scene's tours and media: "?pass=PASS".
   [[nodiscard]] bool has_pass(const HttpRequest& request, std::string_view scene_id) const;
-  /// Such a pass, for the holder of a token. It is good for this scene and some hours, and for no
-  /// longer than the token is.
+  /// Such a pass, for the holder of a token.
   [[nodiscard]] HttpResponse make_pass(const std::string& scene_id, const Permit& permit) const;
   [[nodiscard]] HttpResponse list(const std::string& scene_id) const;
   [[nodiscard]] HttpResponse file(const HttpRequest& request, const std::string& scene_id,

@@ -12,6 +12,14 @@
 namespace catgs {
 namespace {
 
+/// {"de": {"title": …, "credits": …}}
+nlohmann::json json_of(const std::vector<SceneWords>& translations) {
+  auto languages = nlohmann::json::object();
+  for (const auto& [language, title, credits] : translations)
+    languages[language] = {{"title", title}, {"credits", credits}};
+  return languages;
+}
+
 /// Builds the answer to "GET /api/scenes".
 std::shared_ptr<const std::string> scene_list(
     const std::vector<const SceneLibrary::Listing*>& scenes) {
@@ -24,6 +32,8 @@ std::shared_ptr<const std::string> scene_list(
                     {"gaussians", scene->gaussians},
                     {"loaded", scene->loaded}});
     if (!scene->state.empty()) list.back()["state"] = scene->state;
+    if (!scene->about.translations.empty())
+      list.back()["translations"] = json_of(scene->about.translations);
   }
   return std::make_shared<const std::string>(nlohmann::json{{"scenes", list}}.dump());
 }
@@ -77,12 +87,11 @@ HttpResponse SceneApi::about(std::string_view scene_id, const Answer& answer) {
   return answer(*found);
 }
 
-HttpResponse SceneApi::tours(std::string_view scene_id, const Permit& permit) {
+HttpResponse SceneApi::tours(std::string_view scene_id, bool may_save) {
   return about(scene_id, [&](const SceneLibrary::Listing& scene) {
     static const ToursAnswers none;
     const ToursAnswers& tours = scene.tours ? *scene.tours : none;
-    return json_response(permit.allows(scene_id, Use::save) ? tours.for_authors
-                                                            : tours.for_viewers);
+    return json_response(may_save ? tours.for_authors : tours.for_viewers);
   });
 }
 

@@ -22,7 +22,7 @@ class SceneApi {
 
   /// The scenes that the request's token allows.
   HttpResponse list(const HttpRequest& request);
-  HttpResponse tours(std::string_view scene_id, const Permit& permit);
+  HttpResponse tours(std::string_view scene_id, bool may_save);
   HttpResponse poster(std::string_view scene_id);
   HttpResponse walkable_area(std::string_view scene_id, std::string_view if_none_match);
   /// The elements of the page's head that messengers show for a link; empty: none.

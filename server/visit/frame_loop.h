@@ -37,6 +37,9 @@ class FrameLoop {
   void follow(const PosePath& path) { track_.follow(path); }
   /// From the next picture on, until the scene changes.
   void clip(const ClipPlane& plane, TimePoint now);
+  [[nodiscard]] const ClipPlane& clip() const { return clip_; }
+  /// The client's newest camera in this scene, if any.
+  [[nodiscard]] const std::optional<PoseSample>& camera() const { return track_.newest(); }
   /// Continues from the pose of a resumed client, and from the tour that led it.
   void go_on_from(const Hello& hello, TimePoint now);
   /// False: the frame is not in flight.

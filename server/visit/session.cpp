@@ -96,6 +96,8 @@ void reach(const Request& r) {
                   {tour, stop}, r.session.visitor().link_id);
 }
 
+void show(const Request& r) { r.session.audience().tour().show(r.as<Show>()); }
+
 /// How requests of one kind are limited, who may send them, and who handles them. A refusal
 /// without a text is not told.
 struct Rule {
@@ -118,6 +120,7 @@ constexpr Rule rules[] = {
     {is<Ping>, &RequestLimits::pings, always, "", always, "", ping},
     {is<Prepare>, &RequestLimits::preparations, always, "", may_enter, "", prepare},
     {is<Reached>, nullptr, always, "", is_stop, "", reach},
+    {is<Show>, nullptr, always, "", always, "", show},
 };
 
 void refuse(const Request& r, ErrorCode code, std::string_view why) {

@@ -19,7 +19,7 @@ constexpr double pings_per_second = 10.0;
 
 bool same_but_for_camera(const Lead& a, const Lead& b) {
   return a.state == b.state && a.name == b.name && a.participants == b.participants &&
-         a.may_ping == b.may_ping;
+         a.may_ping == b.may_ping && a.shown == b.shown;
 }
 
 }  // namespace
@@ -45,8 +45,7 @@ void SharedTour::end(bool elsewhere) {
 void SharedTour::add(const std::shared_ptr<ClientConnection>& follower) {
   remove(*follower);
   followers_.push_back(follower);
-  Lead now = told_.value_or(
-      Lead{LeadState::leads, settings_.name, followers_.size(), {}, settings_.pings});
+  Lead now = told_.value_or(lead(LeadState::leads, followers_.size()));
   now.camera = camera_;
   follower->connection().send(wire::serialize(now));
   if (!positions_told_.positions.empty())
@@ -80,18 +79,14 @@ void SharedTour::moved(const PoseSample& camera, TimePoint now) {
 
 std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoint now) {
   if (!since_) return std::nullopt;
-  Lead lead{away ? LeadState::away : LeadState::leads,
-            settings_.name,
-            spectators + followers(),
-            {},
-            settings_.pings};
-  if (told_ && same_but_for_camera(*told_, lead)) {
+  const Lead now_told = lead(away ? LeadState::away : LeadState::leads, spectators + followers());
+  if (told_ && same_but_for_camera(*told_, now_told)) {
     if (camera_is_new_) tell_camera(now);
     return std::nullopt;
   }
-  told_ = lead;
+  told_ = now_told;
   tell_camera(now);
-  return lead;
+  return now_told;
 }
 
 bool SharedTour::ping(const Pinged& pinged, TimePoint now) {
@@ -109,6 +104,15 @@ bool SharedTour::tell(const Participants& participants, TimePoint now) {
   return true;
 }
 
+Lead SharedTour::lead(LeadState state, std::size_t participants) const {
+  return {.state = state,
+          .name = settings_.name,
+          .participants = participants,
+          .camera = {},
+          .may_ping = settings_.pings,
+          .shown = shown_};
+}
+
 void SharedTour::tell_followers(const ServerMessage& message) const {
   const OutgoingMessage outgoing = wire::serialize(message);
   for (const auto& known : followers_)
@@ -119,10 +123,9 @@ void SharedTour::tell_camera(TimePoint now) {
   next_camera_ = std::max(next_camera_, now) + between_cameras;
   camera_is_new_ = false;
   if (!since_ || followers_.empty()) return;
-  Lead lead =
-      told_.value_or(Lead{LeadState::leads, settings_.name, followers(), {}, settings_.pings});
-  lead.camera = camera_;
-  tell_followers(lead);
+  Lead told = told_.value_or(lead(LeadState::leads, followers()));
+  told.camera = camera_;
+  tell_followers(told);
 }
 
 }  // namespace catgs

@@ -31,11 +31,16 @@ class SharedTour {
   /// The host's camera has moved or has come to rest. Followers hear of it, or of a newer one,
   /// within 33 ms or by the next news(), 30 times a second at most.
   void moved(const PoseSample& camera, TimePoint now);
+  /// What the visit sees of the scene's tours, whether it hosts or not. The next news() tell it.
+  void show(const Show& shown) { shown_ = shown; }
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
   /// nothing: all know it.
   std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now);
   /// The visit is in another scene now, where its camera has not been yet.
-  void forget_camera() { camera_.reset(); }
+  void forget_camera() {
+    camera_.reset();
+    shown_ = {};
+  }
   /// The newest camera of the visit, whether it hosts or not.
   [[nodiscard]] const std::optional<PoseSample>& camera() const { return camera_; }
 
@@ -50,6 +55,8 @@ class SharedTour {
   [[nodiscard]] const Participants& positions_told() const { return positions_told_; }
 
  private:
+  /// Of a tour that is under way.
+  [[nodiscard]] Lead lead(LeadState state, std::size_t participants) const;
   void tell_followers(const ServerMessage& message) const;
   void tell_camera(TimePoint now);
 
@@ -60,6 +67,7 @@ class SharedTour {
   std::optional<PoseSample> camera_;
   TimePoint next_camera_{};  // followers hear of the camera from then on
   bool camera_is_new_ = false;
+  Show shown_;
   std::optional<RateLimit> pings_;
   Participants positions_told_;
   std::optional<TimePoint> positions_told_at_;

@@ -9,6 +9,17 @@
 #include "server/net/wire.h"
 
 namespace catgs {
+namespace {
+
+/// Which markers are hidden from where the camera is, if that is new.
+std::optional<HiddenMarkers> look(MarkerVisibility& markers, const StreamControl& stream,
+                                  const FrameLoop& frames, TimePoint now) {
+  const SceneEntry* const scene = stream.scene();
+  if (!scene || !scene->surface || !frames.camera()) return std::nullopt;
+  return markers.test(*scene->surface, *frames.camera(), frames.clip(), now);
+}
+
+}  // namespace
 
 Visit::Visit(const VisitPolicy& policy, VisitHost& host, TimePoint now)
     : policy_(policy),
@@ -63,6 +74,7 @@ void Visit::on_message(const ClientMessage& message, TimePoint now) {
 void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
   if (const auto* sample = std::get_if<PoseSample>(&message)) {
     if (frames_.pose_arrived(*sample, now)) life_.note_activity(now);
+    if (const auto hidden = look(markers_, stream_, frames_, now)) say(*hidden, now);
     return;
   }
   if (const auto* ack = std::get_if<Ack>(&message)) {
@@ -91,6 +103,8 @@ void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
     frames_.clip(*plane, now);
   } else if (const auto* pick = std::get_if<Pick>(&message)) {
     if (picks_.take(now)) say(stream_.scene()->seen_along(*pick), now);
+  } else if (const auto* markers = std::get_if<Markers>(&message)) {
+    markers_.watch(*markers);
   }
 }
 
@@ -111,7 +125,10 @@ void Visit::ask_again(TimePoint now) {
 
 bool Visit::begin(const Hello& hello, Admission admission, TimePoint now) {
   life_.note_activity(now);
-  if (admission.scene.get() != stream_.scene()) frames_.enter_scene(admission.scene->facts);
+  if (admission.scene.get() != stream_.scene()) {
+    frames_.enter_scene(admission.scene->facts);
+    markers_.watch({});
+  }
   const bool goes_on = stream_.begin(std::move(admission), hello);
   frames_.go_on_from(hello, now);
   if (!goes_on) stream_.open();
@@ -132,6 +149,7 @@ void Visit::select(const std::string& scene_id, TimePoint now) {
   }
   auto& scene = std::get<std::shared_ptr<const SceneEntry>>(found);
   frames_.enter_scene(scene->facts);
+  markers_.watch({});
   stream_.enter_scene(std::move(scene));
   stream_.open();
 }
@@ -224,6 +242,7 @@ void Visit::on_tick(TimePoint now, int sessions, bool outdated) {
     return;
   }
   stream_.plan().on_tick(now);
+  if (const auto hidden = look(markers_, stream_, frames_, now)) say(*hidden, now);
   if (outdated) frames_.outdate();
   if (const auto idle = life_.idle_message(now)) {
     if (idle->fatal) return fail(idle->code, idle->message);

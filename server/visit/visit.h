@@ -9,6 +9,7 @@
 #include "server/base/rate_limit.h"
 #include "server/flow/flow_control.h"
 #include "server/visit/frame_loop.h"
+#include "server/visit/marker_visibility.h"
 #include "server/visit/stream_control.h"
 #include "server/visit/visit_host.h"
 #include "server/visit/visit_life.h"
@@ -85,6 +86,7 @@ class Visit {
   FlowControl flow_;
   StreamControl stream_;
   FrameLoop frames_;
+  MarkerVisibility markers_;
   VisitStatistics statistics_;
 };
 

@@ -1,8 +1,10 @@
 // Captions with Markdown, and hostile ones, against a server that follows a script.
 import type { BrowserContextOptions } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
+import { angle_between } from '#client/base/vector';
 import { barriers } from './support/axe';
 import { keep_screenshot, open } from './support/browser';
+import { pose_of, settle } from './support/camera';
 import { start_fake_server, type FakeServer, type Script } from './support/fake_server';
 import { start_other_site } from './support/other_site';
 import { painted_jpeg, stream_of } from './support/painted';
@@ -22,7 +24,7 @@ const with_captions = (...captions: string[]): Promise<FakeServer> => {
   const stops = captions.map((caption, i) => ({
     title: `Stop ${i}`,
     caption,
-    marker: [i, 0, 0],
+    marker: [i, 0, 5],
     position: [0, 0, -5],
     orientation: [0, 0, 0, 1],
   }));
@@ -90,4 +92,46 @@ it('a hostile caption runs nothing, asks nobody and leads nowhere', async () => 
   expect(await page.title()).toBe('Demo city – CaT-GS');
   expect(other.asked).toEqual([]);
   expect(errors).toEqual([]);
+});
+
+describe('a hotspot', () => {
+  it.each(Object.keys(windows))(
+    'leaves drags to the view, and opens by a press on a %s',
+    async (name) => {
+      const server = await with_captions('Here.');
+      const { page, errors } = await open(`${server.url}?scene=city`, windows[name]);
+      const spot = page.locator('.hotspot');
+      await spot.waitFor();
+      const { x, y, width, height } = (await spot.boundingBox())!;
+      const finger = await page.context().newCDPSession(page);
+      /** A press on the hotspot, and a way from there to the right. */
+      const drag = async (...way_px: number[]): Promise<void> => {
+        const points = way_px.map((right) => ({ x: x + width / 2 + right, y: y + height / 2 }));
+        if (name === 'desktop') {
+          await page.mouse.move(points[0]!.x, points[0]!.y);
+          await page.mouse.down();
+          for (const point of points) await page.mouse.move(point.x, point.y);
+          return page.mouse.up();
+        }
+        const send = (type: 'touchStart' | 'touchMove' | 'touchEnd', touchPoints: object[]) =>
+          finger.send('Input.dispatchTouchEvent', { type, touchPoints: touchPoints as [] });
+        await send('touchStart', [points[0]!]);
+        for (const point of points) await send('touchMove', [point]);
+        await send('touchEnd', []);
+      };
+      const before = await pose_of(page);
+      await drag(0, 60, 120);
+      await settle(page);
+      expect(angle_between(before.orientation, (await pose_of(page)).orientation)).toBeGreaterThan(
+        0.05,
+      );
+      const position = page.locator('#tour-position');
+      expect(await position.innerText()).toBe('One stop');
+      await page.getByRole('button', { name: 'Back to the start' }).click();
+      await settle(page);
+      await drag(0, 3);
+      await expect.poll(() => position.innerText()).toBe('1 of 1');
+      expect(errors).toEqual([]);
+    },
+  );
 });

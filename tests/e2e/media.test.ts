@@ -104,6 +104,17 @@ describe('an author', () => {
       .poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue())
       .toBe('sea.wav');
     await page.getByLabel('Volume').fill('0.4');
+    // Germans hear and read others.
+    await page.getByLabel('Texts for').selectOption('de');
+    await send('Voice', 'deutsch.wav', tone(10));
+    await send('Sound of the tour', 'meer.wav', tone(3));
+    await expect
+      .poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue())
+      .toBe('meer.wav');
+    await page.getByText('About the scene').click();
+    await page.locator('#about-title').fill('Die Halle');
+    await keep_screenshot(page, 'media-author-german');
+    await page.getByLabel('Texts for').selectOption('');
     await page.locator('#author-sound').scrollIntoViewIfNeeded();
     await keep_screenshot(page, 'media-author-sound');
     await page.getByLabel('What The-roof.jpg shows').scrollIntoViewIfNeeded();
@@ -118,6 +129,16 @@ describe('an author', () => {
 });
 
 describe('a visitor', () => {
+  it('hears a voice and a sound in their own language, and reads the title so', async () => {
+    const { page, errors } = await open(link('viewer'), { ...windows['desktop'], locale: 'de-DE' });
+    await page.locator('#scene-name', { hasText: 'Die Halle' }).waitFor();
+    await page.locator('#tour-next').click();
+    const heard = (nth: string): Promise<string> =>
+      page.evaluate((selector) => document.querySelector<HTMLAudioElement>(selector)!.src, nth);
+    await expect.poll(() => heard('#tour > audio')).toContain('deutsch.wav');
+    expect(errors).toEqual([]);
+  });
+
   it.each(Object.keys(windows))('sees and hears them on a %s', async (name) => {
     const { page, errors } = await open_untouched(link('viewer'), windows[name]);
     const sound = page.locator('#button-sound');

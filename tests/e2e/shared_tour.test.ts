@@ -1,4 +1,5 @@
 // Shared tours: one page presents, others follow its camera or watch its pictures. Against the real server.
+import { copyFileSync, mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -13,14 +14,44 @@ import {
   type RunningServer,
   with_tokens,
 } from './support/programs';
-import { scratch_folder } from './support/scenes';
+import { tone } from './support/media_files';
+import { painted_jpeg } from './support/painted';
+import { scratch_folder, write_tours } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'hall.ply');
 const counted = ['--min-fps', '0']; // slots are counted, whatever this machine can do
 
-beforeAll(() => {
+let guarded: RunningServer; // visitors need tokens, and its scene has a tour
+
+beforeAll(async () => {
   catgs_render('synth', 'city', scene, '--gaussians', '30000');
+  const [toured, media] = [path.join(folder, 'toured.ply'), path.join(folder, 'toured.media')];
+  copyFileSync(scene, toured);
+  copyFileSync(path.join(folder, 'hall.json'), path.join(folder, 'toured.json'));
+  write_tours(path.join(folder, 'toured.json'), ({ focus, start_pose: { position } }) => {
+    const towards = (share: number): number[] =>
+      position.map((v, i) => v + (focus[i]! - v) * share);
+    const stop = {
+      title: 'The hall',
+      caption: 'Built in 1904.',
+      translations: {
+        de: { title: 'Die Halle', caption: '1904 erbaut.' },
+        fr: { caption: 'Bâti en 1904.' },
+      },
+      position: towards(0.2),
+      look_at: focus,
+      marker: towards(0.5),
+      media: [{ src: 'door.jpg', alt: 'A door', translations: { de: { alt: 'Eine Tür' } } }],
+      narration: { src: 'en.wav', translations: { de: { src: 'de.wav' } } },
+    };
+    const gate = { title: 'The gate', position: towards(0.3), look_at: focus };
+    return [{ title: 'A walk', stops: [stop, gate] }];
+  });
+  mkdirSync(media);
+  writeFileSync(path.join(media, 'door.jpg'), Buffer.from(await painted_jpeg()));
+  for (const name of ['en.wav', 'de.wav']) writeFileSync(path.join(media, name), tone(5));
+  guarded = await start_server(toured, [...counted, ...with_tokens]);
 });
 
 async function move(page: Page): Promise<void> {
@@ -139,13 +170,12 @@ describe('a presentation', () => {
   });
 
   it('grants watching to those without a token, and is found by links of role spectator', async () => {
-    const server: RunningServer = await start_server(scene, [...counted, ...with_tokens]);
     const { page: spectator } = await new_page(windows.desktop);
-    await spectator.goto(`${server.url}#token=${access_token('spectator')}`);
+    await spectator.goto(`${guarded.url}#token=${access_token('spectator')}`);
     await spectator.getByRole('heading', { name: 'Nobody is presenting here now' }).waitFor();
     await keep_screenshot(spectator, 'together-nobody');
     const { page: host } = await open(
-      `${server.url}#token=${access_token('viewer')}`,
+      `${guarded.url}#token=${access_token('viewer')}`,
       windows.desktop,
     );
     const link = await present(host);
@@ -162,5 +192,58 @@ describe('a presentation', () => {
       await page.getByRole('heading', { name: 'Nobody is presenting here now' }).waitFor();
     await host.getByRole('button', { name: 'Present', exact: true }).click();
     for (const page of [spectator, guest]) await page.getByText('Ada is presenting').waitFor();
+  });
+
+  it('shows participants the stop that its host shows, each in their own language', async () => {
+    const viewer = `token=${access_token('viewer')}`;
+    const { page: host } = await open(`${guarded.url}#${viewer}`, windows.desktop);
+    const link = await present(host);
+    await host.keyboard.press('Escape');
+    const { page: follower, errors } = await open(`${link}&${viewer}`, {
+      ...windows.phone,
+      locale: 'de-DE',
+    });
+    const { page: guest, errors: more } = await new_page({ ...windows.desktop, locale: 'fr-FR' });
+    await guest.goto(link); // without a token
+    await host.getByText('You are presenting to 2 participants.').waitFor();
+    await host.locator('#tour-next').click();
+    await follower.locator('#tour-text', { hasText: '1904 erbaut.' }).waitFor();
+    await follower.getByRole('heading', { name: 'Die Halle' }).waitFor();
+    await guest.locator('#tour-text', { hasText: 'Bâti en 1904.' }).waitFor();
+    await settle(host);
+    for (const [page, alt, voice] of [
+      [host, 'A door', 'en.wav'],
+      [follower, 'Eine Tür', 'de.wav'],
+      [guest, 'A door', 'en.wav'],
+    ] as const) {
+      await page.locator('.hotspot[aria-current]').waitFor();
+      const picture = page.getByAltText(alt);
+      await expect
+        .poll(() => picture.evaluate((img: HTMLImageElement) => img.naturalWidth))
+        .toBeGreaterThan(0);
+      const heard = page.locator('#tour > audio');
+      await expect.poll(() => heard.evaluate((el: HTMLAudioElement) => el.src)).toContain(voice);
+    }
+    expect(await apart(host, follower)).toBeLessThan(1e-3);
+    await keep_screenshot(follower, 'together-stop-phone');
+    await keep_screenshot(guest, 'together-stop-guest');
+    expect([...(await barriers(follower)), ...(await barriers(guest))]).toEqual([]);
+    // Who watches leads nobody, and sees the hotspot where it is in the host's picture.
+    await guest.keyboard.press('PageDown');
+    expect(await guest.locator('#tour-next').isHidden()).toBe(true);
+    // Without a stop at the host's, there is none at theirs.
+    await host.keyboard.press('KeyR');
+    await follower.getByRole('heading', { name: 'A walk' }).waitFor();
+    await guest.locator('#tour').waitFor({ state: 'hidden' });
+    // On its own, a follower stays at the stop and has the tour for itself.
+    await host.locator('#tour-next').click();
+    await follower.getByRole('heading', { name: 'Die Halle' }).waitFor();
+    await follower.locator('#view').focus();
+    await follower.keyboard.press('ArrowUp');
+    await host.keyboard.press('KeyR');
+    await host.getByText('You are presenting to one participant.').waitFor();
+    expect(await follower.locator('#tour-title').innerText()).toBe('Die Halle');
+    // Without a token there is no poster before the welcome.
+    expect([...errors, ...more.filter((error) => !error.includes('401'))]).toEqual([]);
   });
 });

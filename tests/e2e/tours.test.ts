@@ -198,9 +198,11 @@ describe('a tour that waits at a stop with a long caption', () => {
     copyFileSync(scene, other);
     copyFileSync(path.join(folder, 'city.json'), path.join(folder, 'patient.json'));
     write_tours(path.join(folder, 'patient.json'), ({ focus, start_pose: { position } }) => {
-      const stop = (title: string, caption: string) => ({
+      // The tower's marker is behind trees, the gate's on the street.
+      const stop = (title: string, caption: string, marker: readonly number[]) => ({
         title,
         caption,
+        marker,
         position,
         look_at: focus,
         stay_s: 60,
@@ -208,12 +210,34 @@ describe('a tour that waits at a stop with a long caption', () => {
       return [
         {
           title: 'Patience',
-          stops: [stop('The tower', 'A long story. '.repeat(40)), stop('The gate', 'Closed.')],
+          stops: [
+            stop('The tower', 'A long story. '.repeat(40), [-12, -1, 36]),
+            stop('The gate', 'Closed.', [6, -1, 15]),
+          ],
         },
       ];
     });
     patient = await start_server(other, ['--min-fps', '0']);
   });
+
+  it.each(Object.entries({ desktop: windows.desktop, phone: windows.phone }))(
+    'hides a hotspot while the scene is before it: %s',
+    async (name, options) => {
+      const { page, errors } = await open(patient.url, options);
+      const shown = (title: string): Promise<boolean | undefined> =>
+        page
+          .locator('.hotspot', { hasText: title })
+          .evaluate((spot: HTMLElement) =>
+            spot.hidden ? undefined : spot.checkVisibility({ visibilityProperty: true }),
+          );
+      await expect.poll(() => shown('The tower')).toBe(false);
+      expect(await shown('The gate')).toBe(true);
+      await keep_screenshot(page, `hotspot-behind-${name}`);
+      await page.evaluate(() => (location.hash = 'at=-12,-2,31,0,0,0,1,60'));
+      await expect.poll(() => shown('The tower')).toBe(true);
+      expect(errors).toEqual([]);
+    },
+  );
 
   it.each([
     ['the key R', (page: Page) => page.keyboard.press('KeyR')],

@@ -4,6 +4,7 @@ import { Picks } from '#client/session/picks';
 import { nothing_said, TourDraft } from '#client/tour/draft';
 import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/save';
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
+import { texts_written } from '#client/text/translations';
 import { untranslated } from '#client/tour/words';
 import { scene } from './cameras';
 import { FakeTime } from './fakes';
@@ -149,6 +150,13 @@ describe('a draft of a tour', () => {
       background: '#ffffff',
     });
     expect(draft.sidecar(scene)).not.toHaveProperty('licence');
+    expect(draft.sidecar(scene)).not.toHaveProperty('translations');
+    const { about } = draft.state;
+    draft.edit_about(texts_written(about, 'de', { title: 'Halle' }, { title: '', credits: '' }));
+    expect(draft.sidecar(scene)).toMatchObject({
+      title: 'Hall',
+      translations: { de: { title: 'Halle' } },
+    });
     const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };
     const sidecar = draft.sidecar({
       ...scene,

@@ -104,6 +104,7 @@ export class FakeSession {
         stream_ended: ignore,
         stats: ignore,
         picked: ignore,
+        hidden_markers: ignore,
         pinged: ignore,
         participants: ignore,
         lead: ignore,

@@ -36,9 +36,9 @@ describe('media of a sidecar', () => {
       { media, narration: { src: 'a.mp3', captions: 'a.vtt' } },
       { sound: { src: 'sea.ogg', volume: 0.2 } },
     );
-    expect(tour.sound).toEqual({ src: 'sea.ogg', volume: 0.2 });
+    expect(tour.sound).toMatchObject({ src: 'sea.ogg', volume: 0.2 });
     const [stop] = tour.stops;
-    expect(stop!.narration).toEqual({ src: 'a.mp3', captions: 'a.vtt' });
+    expect(stop!.narration).toMatchObject({ src: 'a.mp3', captions: 'a.vtt' });
     expect(stop!.media!.map(({ kind, alt, captions }) => [kind, alt, captions])).toEqual([
       ['image', 'A door', ''],
       ['video', '', 'film.vtt'],
@@ -65,6 +65,35 @@ describe('media of a sidecar', () => {
     expect(alt_for('fr')).toMatchObject({ alt: 'A door', language: '' });
   });
 
+  it('are heard and captioned in the language of the visitor, part by part', () => {
+    const narration = {
+      src: 'a.mp3',
+      captions: 'a.vtt',
+      translations: {
+        de: { src: 'https://media.example/de', type: 'audio' },
+        fr: { captions: 'f.vtt' },
+      },
+    };
+    const sound = { src: 'sea.ogg', translations: { de: { src: 'meer.ogg' } } };
+    const film = {
+      src: 'film.mp4',
+      captions: 'film.vtt',
+      translations: { de: { captions: 'd.vtt' } },
+    };
+    const tour = read({ media: [film], narration }, { sound });
+    const for_reader = (reader: string): unknown[] => {
+      const [shown] = tours_for([tour], [reader]);
+      const [{ narration: voice, media: shows }] = shown!.stops as [Stop];
+      return [voice!.src, voice!.captions, shown!.sound!.src, shows![0]!.captions];
+    };
+    expect(for_reader('de-AT')).toEqual(['https://media.example/de', 'a.vtt', 'meer.ogg', 'd.vtt']);
+    expect(for_reader('fr')).toEqual(['a.mp3', 'f.vtt', 'sea.ogg', 'film.vtt']);
+    expect(for_reader('ja')).toEqual(['a.mp3', 'a.vtt', 'sea.ogg', 'film.vtt']);
+    const [written] = write_tours([tour]) as { sound: object; stops: object[] }[];
+    expect(written!.sound).toEqual(sound);
+    expect(written!.stops[0]).toMatchObject({ narration, media: [film] });
+  });
+
   it.each([
     [{ media: {} }, 'tours[0].stops[0].media: is not a list'],
     [{ media: [{ alt: 'x' }] }, "media[0]: 'src' is missing"],
@@ -85,6 +114,10 @@ describe('media of a sidecar', () => {
     ],
     [{ media: Array.from({ length: 9 }, () => ({ src: 'a.mp3' })) }, 'has 9 entries, at most 8'],
     [{ narration: { src: 'a.mp4' } }, 'narration.src: is not a sound'],
+    [
+      { narration: { src: 'a.mp3', translations: { de: { src: 'a.mp4' } } } },
+      'narration.translations.de.src: is not a sound',
+    ],
   ])('are refused by the field that is wrong: %j', (stop, complaint) => {
     expect(() => stop_of(stop)).toThrow(complaint);
   });

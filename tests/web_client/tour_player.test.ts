@@ -96,6 +96,22 @@ describe('the player', () => {
     };
   }
 
+  it('shows what another visitor leads to, and leaves the camera to them', () => {
+    const { player, time, arrive, flying, paths, reached, state } = guided();
+    player.load([tour, { ...tour, title: 'another' }]);
+    player.play();
+    arrive();
+    player.be_shown(1, 2);
+    expect(state()).toMatchObject({ tour_index: 1, stop_index: 2, playing: false });
+    const told = paths.length;
+    time.advance(60_000);
+    expect([flying(), paths.length, reached]).toEqual([undefined, told, [[0, 0]]]);
+    player.be_shown(7, 0); // a tour that this visitor does not have
+    expect(state()).toMatchObject({ tour_index: 1, stop_index: 2 });
+    player.be_shown(0, 9);
+    expect(state()).toMatchObject({ tour_index: 0, stop: undefined });
+  });
+
   it('stays while a voice speaks, however short the stay is', () => {
     const { player, time, arrive, flying, speak, fall_silent, state } = guided();
     player.load([tour]);

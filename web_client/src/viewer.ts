@@ -24,7 +24,7 @@ export function mount_viewer(
   const parts = make_page_parts(token);
   const { view, worker, navigation, clock } = parts;
   const stream_size = new StreamSize(view, worker);
-  const media = new TourMedia(() => token.value);
+  const media = new TourMedia(token);
   const { tours, measures, set_scale } = mount_tours(parts, media, new TourMediaFields());
   media.enlarged.listen(() => tours.player.pause());
   mount_panels(parts, stream_size, measures, set_scale);
@@ -37,7 +37,11 @@ export function mount_viewer(
   });
   worker.on('participants_moved', ({ positions }) => walkable_area.show_participants(positions));
   const shared_tour = new SharedTour(parts, new Pointing(parts));
-  shared_tour.left.listen(() => walkable_area.show_participants([]));
+  shared_tour.left.listen(() => {
+    walkable_area.show_participants([]);
+    tours.guide(undefined);
+  });
+  shared_tour.shown.listen((shown) => tours.guide(shown));
   const screen = new AwakeScreen();
   tours.shown.listen(({ playing }) => screen.watch('tour', playing));
   shared_tour.takes_part.listen((takes_part) => screen.watch('leader', takes_part));

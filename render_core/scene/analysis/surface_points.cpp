@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -75,22 +76,44 @@ SurfacePoints::Ball SurfacePoints::around(std::span<const Point> points) {
   return ball;
 }
 
-std::optional<SurfacePoints::Hit> SurfacePoints::hit_along(const glm::vec3& origin,
-                                                           const glm::vec3& direction) const {
+template <typename Visit>
+void SurfacePoints::for_points_on(const glm::vec3& origin, const glm::vec3& direction,
+                                  float farthest, const Visit& visit) const {
   assert(std::abs(glm::length(direction) - 1.0f) < 1e-3f);
-  std::vector<std::pair<float, float>> stops;  // distance, alpha
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
     const Ball& ball = clusters_[c];
     const Approach passes = approach(origin, direction, ball.centre);
-    if (passes.along < -ball.radius || passes.beside2 > ball.radius * ball.radius) continue;
+    if (passes.along < -ball.radius || passes.along > farthest + ball.radius ||
+        passes.beside2 > ball.radius * ball.radius)
+      continue;
     for (const Point& point : points_of(c)) {
       const auto [along, beside2] = approach(origin, direction, point.centre);
       const float sigma2 = point.sigma * point.sigma;
       // The balls around the camera are no target.
-      if (along <= point.sigma || beside2 > reach * reach * sigma2) continue;
-      stops.emplace_back(along, point.opacity * std::exp(-0.5f * beside2 / sigma2));
+      if (along <= point.sigma || along >= farthest || beside2 > reach * reach * sigma2) continue;
+      if (!visit(along, point.opacity * std::exp(-0.5f * beside2 / sigma2))) return;
     }
   }
+}
+
+float SurfacePoints::light_from(const glm::vec3& origin, const glm::vec3& direction, float distance,
+                                float enough) const {
+  float left = 1.0f;
+  for_points_on(origin, direction, distance, [&](float, float alpha) {
+    left *= 1.0f - alpha;
+    return left >= enough;
+  });
+  return left;
+}
+
+std::optional<SurfacePoints::Hit> SurfacePoints::hit_along(const glm::vec3& origin,
+                                                           const glm::vec3& direction) const {
+  std::vector<std::pair<float, float>> stops;  // distance, alpha
+  for_points_on(origin, direction, std::numeric_limits<float>::max(),
+                [&](float distance, float alpha) {
+                  stops.emplace_back(distance, alpha);
+                  return true;
+                });
   std::ranges::sort(stops);
   std::optional<float> first, middle;
   float last = 0.0f, left = 1.0f;

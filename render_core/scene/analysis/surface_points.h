@@ -30,6 +30,10 @@ class SurfacePoints {
   /// points of the clusters that the ray meets.
   [[nodiscard]] std::optional<Hit> hit_along(const glm::vec3& origin,
                                              const glm::vec3& direction) const;
+  /// The share of the light that comes from so far along the ray to its origin, or any share below
+  /// `enough`. Faster than hit_along().
+  [[nodiscard]] float light_from(const glm::vec3& origin, const glm::vec3& direction,
+                                 float distance, float enough) const;
 
  private:
   struct Ball {
@@ -42,6 +46,11 @@ class SurfacePoints {
     float opacity;
   };
   [[nodiscard]] std::span<const Point> points_of(std::size_t cluster) const;
+  /// Calls `visit(distance, alpha)` for the points that the ray meets before `farthest`, cluster by
+  /// cluster, until it returns false.
+  template <typename Visit>
+  void for_points_on(const glm::vec3& origin, const glm::vec3& direction, float farthest,
+                     const Visit& visit) const;
   static Ball around(std::span<const Point> points);
 
   std::vector<Point> points_;   // along a Morton curve

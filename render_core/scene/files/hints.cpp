@@ -16,6 +16,7 @@
 #include "render_core/base/printable.h"
 #include "render_core/math/axis_name.h"
 #include "render_core/math/look_at.h"
+#include "render_core/scene/files/tour_check.h"
 #include "render_core/scene/formats/json_field.h"
 
 namespace catgs {
@@ -98,6 +99,13 @@ SceneAbout parse_about(const JsonField& root) {
     about.metres_per_unit = metres->number();
     if (!is_metres_per_unit(about.metres_per_unit)) metres->fail("is not in 1e-6…1e6");
   }
+  check_translations(root, {"title", "credits"});
+  if (const auto translations = root.find("translations"))
+    for (const auto& [tag, value] : translations->value().items()) {
+      const JsonField words = translations->at(tag);
+      about.translations.push_back(
+          {tag, parse_line(words.find("title")), parse_line(words.find("credits"))});
+    }
   return about;
 }
 
@@ -107,9 +115,10 @@ Sidecar read_sidecar(const ByteSource& file, const glm::dvec3& origin) {
   const nlohmann::json document = read_json(file, max_sidecar_bytes);
   const JsonField root(file.name(), document);
   if (!document.is_object()) root.fail("is not a JSON object");
-  static constexpr std::array known = {
-      "up",   "start_pose", "near",  "limits", "focus",    "title",           "credits", "licence",
-      "mode", "background", "model", "tours",  "measures", "metres_per_unit", hash_field};
+  static constexpr std::array known = {"up",       "start_pose",      "near",         "limits",
+                                       "focus",    "title",           "credits",      "licence",
+                                       "mode",     "background",      "model",        "tours",
+                                       "measures", "metres_per_unit", "translations", hash_field};
   Sidecar sidecar;
   for (const auto& [key, value] : document.items())
     if (std::ranges::find(known, key) == known.end())
@@ -201,6 +210,11 @@ void write_sidecar(const SceneHints& hints, const std::filesystem::path& path,
   if (about.background_rgb != 0)
     document["background"] = fmt::format("#{:06x}", about.background_rgb);
   if (about.metres_per_unit != 0.0f) document["metres_per_unit"] = about.metres_per_unit;
+  for (const auto& [language, title, credits] : about.translations) {
+    auto& words = document["translations"][language] = nlohmann::ordered_json::object();
+    if (!title.empty()) words["title"] = title;
+    if (!credits.empty()) words["credits"] = credits;
+  }
   if (page_fields)
     for (const auto& [name, value] : page_fields->items()) document[name] = value;
   document[hash_field] = hash_of(nlohmann::json::parse(document.dump()));

@@ -33,6 +33,7 @@ inline constexpr std::uint64_t max_sidecar_bytes = 4 << 20;
 ///   "limits":     {"min": [x, y, z], "max": [x, y, z]}
 ///   "focus":      [x, y, z]
 ///   "title":      text of at most 800 bytes, as "credits" and "licence" are
+///   "translations": {"de": {"title": …, "credits": …}, …}, by BCP 47 tags
 ///   "mode":       "orbit", "fly" or "walk": how a visitor moves at first
 ///   "background": "#rrggbb"
 ///   "metres_per_unit": length of a world unit

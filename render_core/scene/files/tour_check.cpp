@@ -65,20 +65,23 @@ bool is_language_tag(std::string_view tag) {
   return length > 0 && tag.size() >= 2 && tag.size() <= 35;
 }
 
-/// Checks the texts of a tour or a stop in other languages: {"de": {"title": …}}.
-void check_translations(const JsonField& item, std::initializer_list<std::string_view> texts) {
+/// Calls `check` with the language of each translation of `item`: {"de": {"title": …}}.
+template <typename Check>
+void for_translations(const JsonField& item, std::initializer_list<std::string_view> members,
+                      const Check& check) {
   const auto translations = item.find("translations");
   if (!translations) return;
   static_cast<void>(translations->find("de"));  // throws if it is no object
-  const nlohmann::json& members = translations->value();
-  if (members.size() > max_languages)
-    translations->fail(fmt::format("has {} languages, at most {}", members.size(), max_languages));
-  for (const auto& [tag, value] : members.items()) {
+  const nlohmann::json& languages = translations->value();
+  if (languages.size() > max_languages)
+    translations->fail(
+        fmt::format("has {} languages, at most {}", languages.size(), max_languages));
+  for (const auto& [tag, value] : languages.items()) {
     if (!is_language_tag(tag))
       translations->fail(fmt::format("'{}' is no language", tag), "a tag such as de or zh-Hans");
     const JsonField words = translations->at(tag);
-    check_members(words, texts);
-    for (const std::string_view text : texts) check_text(words.find(text));
+    check_members(words, members);
+    check(words);
   }
 }
 
@@ -116,6 +119,24 @@ void check_captions_of(const JsonField& medium) {
     captions->fail("is no name of a .vtt file");
 }
 
+/// Checks a voice or the sound of a tour, which may be another one in each language.
+void check_sound(const JsonField& sound, const MediaOrigins* origins, bool has_captions) {
+  const auto check = [&](const JsonField& spoken) {
+    if (check_source(spoken, origins) != MediaKind::audio) spoken.at("src").fail("is no sound");
+    if (has_captions) check_captions_of(spoken);
+  };
+  check(sound);
+  const auto check_translation = [&](const JsonField& spoken) {
+    if (spoken.find("src")) return check(spoken);
+    if (spoken.find("type")) spoken.fail("has a type and no src");
+    check_captions_of(spoken);
+  };
+  if (has_captions)
+    for_translations(sound, {"src", "type", "captions"}, check_translation);
+  else
+    for_translations(sound, {"src", "type"}, check_translation);
+}
+
 void check_medium(const JsonField& medium, const MediaOrigins* origins) {
   check_members(medium, {"src", "type", "alt", "captions", "translations"});
   const MediaKind kind = check_source(medium, origins);
@@ -123,12 +144,11 @@ void check_medium(const JsonField& medium, const MediaOrigins* origins) {
   if (kind == MediaKind::image && medium.at("alt").text().empty())
     medium.at("alt").fail("is empty", "say what the picture shows, for those who do not see it");
   check_text(medium.find("alt"));
-  check_translations(medium, {"alt"});
+  for_translations(medium, {"alt", "captions"}, [](const JsonField& words) {
+    check_text(words.find("alt"));
+    check_captions_of(words);
+  });
   check_captions_of(medium);
-}
-
-void check_sound(const JsonField& sound, const MediaOrigins* origins) {
-  if (check_source(sound, origins) != MediaKind::audio) sound.at("src").fail("is no sound");
 }
 
 void check_view(const JsonField& view) {
@@ -176,9 +196,8 @@ void check_stop(const JsonField& stop, const MediaOrigins* origins) {
     for (std::size_t i = 0; i < media->size(); ++i) check_medium((*media)[i], origins);
   }
   if (const auto narration = stop.find("narration")) {
-    check_members(*narration, {"src", "type", "captions"});
-    check_sound(*narration, origins);
-    check_captions_of(*narration);
+    check_members(*narration, {"src", "type", "captions", "translations"});
+    check_sound(*narration, origins, true);
   }
   check_text(stop.find("title"));
   check_text(stop.find("caption"));
@@ -193,8 +212,8 @@ void check_stop(const JsonField& stop, const MediaOrigins* origins) {
 void check_tour(const JsonField& tour, const MediaOrigins* origins) {
   check_members(tour, {"title", "translations", "autoplay", "sound", "stops"});
   if (const auto sound = tour.find("sound")) {
-    check_members(*sound, {"src", "type", "volume"});
-    check_sound(*sound, origins);
+    check_members(*sound, {"src", "type", "volume", "translations"});
+    check_sound(*sound, origins, false);
     check_number(sound->find("volume"), 0.0f, 1.0f);
   }
   check_text(tour.find("title"));
@@ -229,6 +248,12 @@ void check_measures(const JsonField& measures) {
 }
 
 }  // namespace
+
+void check_translations(const JsonField& item, std::initializer_list<std::string_view> texts) {
+  for_translations(item, texts, [&](const JsonField& words) {
+    for (const std::string_view text : texts) check_text(words.find(text));
+  });
+}
 
 void check_page_fields(const JsonField& sidecar, const MediaOrigins* media_origins) {
   if (const auto measures = sidecar.find("measures")) check_measures(*measures);

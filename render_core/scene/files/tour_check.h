@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,10 @@ namespace catgs {
 using MediaOrigins = std::vector<std::string>;
 
 inline constexpr std::size_t max_portal_bytes = 128;  // of the id of a scene that one leads to
+
+/// Checks the texts of something in other languages: {"translations": {"de": {"title": …}}}. Throws
+/// InputError that names the field.
+void check_translations(const JsonField& item, std::initializer_list<std::string_view> texts);
 
 /// Checks the tours and measures of a sidecar, more strictly than pages do: every field must be
 /// known, of the right type and within bounds. Media are files of the scene's folder, or addresses

@@ -102,6 +102,14 @@ void require_sound(const ClipPlane& plane) {
 }
 void require_sound(const Ping& ping) { require_place(ping.place); }
 
+void require_sound(const Markers& markers) {
+  require(markers.points.size() <= 256, "markers are bounded");
+  for (const glm::vec3& point : markers.points) require_place(point);
+}
+void require_sound(const Show& shown) {
+  require(shown.tour <= 32 && shown.stop <= 256, "stops are those that tours may have");
+}
+
 void require_sound(const Prepare& wish) { require_text(wish.scene_id, 128); }
 
 template <class Message>
@@ -151,6 +159,8 @@ std::map<std::string, std::string> client_message_seeds() {
     for (std::uint64_t id = 1; id < 4; ++id) fill(*m.mutable_path()->add_samples(), id);
   });
   add("ping", [](auto& m) { m.mutable_ping()->mutable_place()->set_y(-1.5f); });
+  add("markers", [](auto& m) { m.mutable_markers()->add_points()->set_y(-1.5f); });
+  add("show", [](auto& m) { m.mutable_show()->set_stop(2); });
   add("prepare", [](auto& m) { m.mutable_prepare()->set_scene_id("hall"); });
   add("ack", [](auto& m) {
     m.mutable_ack()->set_frame_id(9);

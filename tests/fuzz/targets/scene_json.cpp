@@ -72,6 +72,10 @@ void parse_sidecar(Bytes input) {
   const SceneAbout& about = sidecar.about;
   for (const std::string& text : {about.title, about.credits, about.licence})
     require(printable(text) == text, "texts for visitors are printable");
+  require(about.translations.size() <= 32, "languages are bounded");
+  for (const SceneWords& words : about.translations)
+    require(printable(words.title + words.credits) == words.title + words.credits,
+            "translations are printable");
   require(about.background_rgb <= 0xffffff, "the background is a colour");
   if (sidecar.start_pose)
     require_sound(Pose{sidecar.start_pose->position, sidecar.start_pose->orientation});
@@ -201,7 +205,7 @@ std::vector<Target> scene_json_targets() {
            .seeds = sidecar_seeds,
            .dictionary = json_words(
                "up near focus start_pose position look_at orientation limits min max tours title "
-               "credits licence mode walk background #0a10ff -y +z"),
+               "credits licence mode walk background #0a10ff translations de -y +z"),
            .change = change_json},
           {.name = "cameras",
            .parse = parse_cameras,

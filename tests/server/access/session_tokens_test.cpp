@@ -43,5 +43,21 @@ TEST(SessionTokens, ResumingEndsAfterADay) {
   EXPECT_FALSE(tokens.read_resume_token(token, now_s + 86'401));
 }
 
+TEST(SessionTokens, APassOpensItsSceneForSomeHours) {
+  const SessionTokens tokens(random_key());
+  Permit permit;
+  permit.token_id = "12ab";
+  const std::string pass = tokens.scene_pass("hall", permit, now_s);
+  EXPECT_EQ(tokens.read_scene_pass(pass, "hall", now_s + 3600), "12ab");
+  EXPECT_FALSE(tokens.read_scene_pass(pass, "attic", now_s));
+  EXPECT_FALSE(tokens.read_scene_pass(pass, "hall", now_s + 4 * 3600));
+  EXPECT_FALSE(tokens.read_scene_pass(tokens.watch_token("hall"), "hall", now_s));
+  EXPECT_FALSE(SessionTokens(random_key()).read_scene_pass(pass, "hall", now_s));
+  permit.expires_unix_s = now_s + 60;
+  const std::string brief = tokens.scene_pass("hall", permit, now_s);
+  EXPECT_TRUE(tokens.read_scene_pass(brief, "hall", now_s + 59));
+  EXPECT_FALSE(tokens.read_scene_pass(brief, "hall", now_s + 60)) << "no longer than the token";
+}
+
 }  // namespace
 }  // namespace catgs

@@ -146,7 +146,9 @@ TEST_F(Media, NeedALinkOrAPassOfTheScene) {
   EXPECT_EQ(by_pass(file, pass + "x"), 401);
   EXPECT_EQ(by_pass(file, ""), 401);
   EXPECT_EQ(by_pass(file, make_link("viewer")), 401) << "a link is no pass";
-  EXPECT_EQ(by_pass("tours", pass), 401) << "it is good for media alone";
+  EXPECT_EQ(by_pass("tours", pass), 200);
+  EXPECT_THAT(get("tours?pass=" + pass, {}, "").body, HasSubstr(R"("may_save":false)"));
+  EXPECT_EQ(by_pass("walk", pass), 401) << "it is good for tours and media alone";
   EXPECT_EQ(by_pass("media", pass), 401);
   EXPECT_EQ(http_get(server->port(), "/api/scenes/garden/media/door.jpg?pass=" + pass).status, 401);
   EXPECT_EQ(get("tours", {}, pass).status, 401);

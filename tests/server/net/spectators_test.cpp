@@ -89,6 +89,8 @@ TEST(Spectators, SeeWhatTheHostSeesInOneEncoding) {
   EXPECT_EQ(welcome.config().width_px(), 160u) << "the host's picture, whatever was requested for";
   EXPECT_EQ(welcome.resume_token(), "") << "the host's secrets stay the host's";
   EXPECT_EQ(welcome.watch_token(), "");
+  EXPECT_NE(welcome.scene_pass(), "");
+  EXPECT_EQ(host.welcome.scene_pass(), "");
 
   std::map<std::uint64_t, std::vector<std::byte>> seen;
   const ReceivedFrame first = spectator.receive_frame();

@@ -35,6 +35,37 @@ TEST(WireClip, IsAPlaneOfFiniteNumbers) {
   EXPECT_EQ(wrong_field(message), "clip.offset");
 }
 
+TEST(WireSharedTour, ShownStopsAreThoseThatToursMayHave) {
+  v1::ClientMessage message;
+  message.mutable_show()->set_tour(32);
+  message.mutable_show()->set_stop(256);
+  EXPECT_EQ(parsed<Show>(message), (Show{32, 256, false}));
+  message.mutable_show()->set_stop(257);
+  EXPECT_EQ(wrong_field(message), "show.stop");
+  message.mutable_show()->set_tour(33);
+  EXPECT_EQ(wrong_field(message), "show.tour");
+}
+
+TEST(WireMarkers, AreAtMostSoManyPointsAndFinite) {
+  v1::ClientMessage message;
+  for (int i = 0; i < 256; ++i) message.mutable_markers()->add_points()->set_x(1.0f);
+  message.mutable_markers()->set_id(9);
+  EXPECT_EQ(parsed<Markers>(message).id, 9u);
+  EXPECT_EQ(parsed<Markers>(message).points.size(), 256u);
+  message.mutable_markers()->mutable_points(7)->set_y(std::numeric_limits<float>::infinity());
+  EXPECT_EQ(wrong_field(message), "markers.points.y");
+  message.mutable_markers()->mutable_points(7)->set_y(0.0f);
+  message.mutable_markers()->add_points();
+  EXPECT_EQ(wrong_field(message), "markers.points");
+  const OutgoingMessage hidden = wire::serialize(HiddenMarkers{9, {0, 200}});
+  EXPECT_EQ(hidden.topic, Topic::markers);
+  EXPECT_EQ(hex(hidden.bytes),
+            "01"
+            "6207"
+            "0809"
+            "120300c801");
+}
+
 TEST(WireSharedTour, ListsThePositionsOfParticipants) {
   EXPECT_EQ(wire::serialize(Pinged{}).topic, Topic::ping);
   EXPECT_EQ(wire::serialize(Participants{}).topic, Topic::participants);

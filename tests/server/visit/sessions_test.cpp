@@ -205,6 +205,30 @@ TEST_F(SharedTourTest, FollowersPointWhereTheLeaderLetsThem) {
   EXPECT_EQ(heard_of(stranger, 1), 0u) << "who follows nobody points at nothing";
 }
 
+TEST_F(SharedTourTest, ParticipantsHearWhichStopTheHostSees) {
+  begin(false, false);
+  const auto show = [&](std::uint32_t stop, bool arrived) {
+    v1::ClientMessage message;
+    message.mutable_show()->set_tour(1);
+    message.mutable_show()->set_stop(stop);
+    message.mutable_show()->set_arrived(arrived);
+    say(*leader, message);
+  };
+  EXPECT_FALSE(follower->connection->lead->has_shown());
+  show(3, false);
+  run_until([&] { return follower->connection->lead->shown().stop() == 3; });
+  EXPECT_FALSE(follower->connection->lead->shown().arrived());
+  show(3, true);
+  run_until([&] { return follower->connection->lead->shown().arrived(); });
+  Visitor& late = join();
+  follow(late);
+  EXPECT_EQ(late.connection->lead->shown().stop(), 3u) << "at once";
+  EXPECT_EQ(late.connection->lead->shown().tour(), 1u);
+  lead_to_the_attic();
+  follow(late);
+  EXPECT_FALSE(late.connection->lead->has_shown()) << "another scene has other stops";
+}
+
 TEST_F(SharedTourTest, SharedTourBeginsAFewTimesASecondAtMost) {
   begin(false, false);
   v1::ClientMessage off, on, follows;

@@ -19,7 +19,7 @@ TEST_F(VisitTest, AnotherSceneWelcomesAgain) {
   EXPECT_FALSE(session.next_frame()) << "a pose of the old scene shows nothing of the new one";
 }
 
-TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
+std::shared_ptr<const SceneEntry> scene_of_a_ball() {
   GaussianCloud cloud;
   cloud.resize(1, 0);
   cloud.mean[0] = {0.0f, 0.0f, 3.0f};
@@ -28,7 +28,11 @@ TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
   auto scene = std::make_shared<SceneEntry>();
   ThreadPool pool(1);
   scene->surface = std::make_shared<const SurfacePoints>(cloud, pool);
-  host.admission = Admission{scene, {EncoderKind::x264, Codec::h264, "libx264"}};
+  return scene;
+}
+
+TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
+  host.admission = Admission{scene_of_a_ball(), {EncoderKind::x264, Codec::h264, "libx264"}};
   greet();
   session.on_message(Pick{5, glm::vec3(0.0f), {0.0f, 0.0f, 1.0f}}, now);
   const auto* picked = std::get_if<Picked>(&host.said.back());
@@ -45,6 +49,25 @@ TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
   EXPECT_EQ(std::get<Picked>(host.said.back()).id, 100u);
   session.on_message(Pick{101, {}, {0.0f, 0.0f, 1.0f}}, now);
   EXPECT_EQ(host.count<Picked>(), 33);
+}
+
+TEST_F(VisitTest, SaysWhichMarkersTheSceneHidesAsTheCameraMoves) {
+  host.admission = Admission{scene_of_a_ball(), {EncoderKind::x264, Codec::h264, "libx264"}};
+  greet();
+  session.on_message(Markers{1, {{0.0f, 0.0f, 9.0f}}}, now);
+  session.on_tick(now += 250ms);
+  EXPECT_EQ(host.count<HiddenMarkers>(), 0) << "there is no camera yet";
+  pose(1, 0.0f);
+  ASSERT_EQ(host.count<HiddenMarkers>(), 1);
+  EXPECT_EQ(std::get<HiddenMarkers>(host.said.back()).indices, (std::vector<std::uint32_t>{0}));
+  now += 250ms;
+  pose(2, 8.0f);
+  ASSERT_EQ(host.count<HiddenMarkers>(), 2);
+  EXPECT_TRUE(std::get<HiddenMarkers>(host.said.back()).indices.empty());
+  session.on_message(SelectScene{"b"}, now);
+  open_stream();
+  for (int tick = 0; tick < 4; ++tick) session.on_tick(now += 250ms);
+  EXPECT_EQ(host.count<HiddenMarkers>(), 2) << "another scene has none of them";
 }
 
 TEST_F(VisitTest, AHelloWaitsForItsSceneAndIsTold) {

@@ -1,6 +1,9 @@
 import { camera_modes } from '../camera/mode';
 import { by_id } from '../page/dom';
-import type { SceneAbout } from '../tour/draft';
+import { texts_for } from '../text/translations';
+import type { SceneAbout, SceneWords } from '../tour/draft';
+
+export const no_scene_words: SceneWords = { title: '', credits: '' };
 
 /** The fields for what visitors are told of the scene. */
 export class AuthorAbout {
@@ -23,8 +26,14 @@ export class AuthorAbout {
     );
   }
 
-  show(about: SceneAbout): void {
-    for (const [name, line] of this.lines_) line.value = about[name];
+  /** Shows the texts for one language; '' for those that all others get. */
+  show(about: SceneAbout, language: string): void {
+    const words = { ...about, ...texts_for<SceneWords>(about, language, no_scene_words) };
+    for (const [name, line] of this.lines_) {
+      line.value = words[name];
+      line.placeholder = language ? about[name] : '';
+      line.lang = name === 'licence' ? '' : language;
+    }
     this.mode_.value = about.mode ?? '';
     this.background_.value = about.background;
   }

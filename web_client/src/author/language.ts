@@ -1,6 +1,7 @@
 import { by_id } from '../page/dom';
 import { languages } from '../text/language';
 import { locale, text } from '../text/text';
+import type { SceneAbout } from '../tour/draft';
 import type { Tour } from '../tour/tour';
 
 /** The choice for whom an author writes: all visitors, or those who read one language. */
@@ -21,13 +22,15 @@ export class AuthorLanguage {
     this.choice_.value = '';
   }
 
-  /** Offers the languages of the page, and those that these tours have besides. */
-  offer(tours: readonly Tour[]): void {
-    const used = tours.flatMap(({ translations, stops }) => [
-      translations,
-      ...stops.map((stop) => stop.translations),
+  /** Offers the languages of the page, and those that the tours and the scene have besides. */
+  offer(tours: readonly Tour[], about: SceneAbout): void {
+    const items = tours.flatMap((tour) => [
+      tour,
+      tour.sound,
+      ...tour.stops.flatMap((stop) => [stop, stop.narration, ...(stop.media ?? [])]),
     ]);
-    const tags = new Set<string>([...languages, ...used.flatMap((words) => [...words.keys()])]);
+    const used = [about, ...items].flatMap((item) => [...(item?.translations.keys() ?? [])]);
+    const tags = new Set<string>([...languages, ...used]);
     const chosen = this.choice_.value;
     this.choice_.replaceChildren(
       new Option(text.author.all_visitors, ''),

@@ -4,6 +4,7 @@ import { by_id, on_click, save_file } from '../page/dom';
 import type { Navigation } from '../page/navigation';
 import { file_name_of, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
+import { texts_written } from '../text/translations';
 import { TourDraft, type SceneAbout } from '../tour/draft';
 import { max_tours } from '../tour/limits';
 import type { MeasureList } from '../tour/measure_list';
@@ -12,7 +13,7 @@ import type { TourPlayer } from '../tour/player';
 import { save_sidecar, type SidecarTag } from '../tour/save';
 import { tours_for, type Tour } from '../tour/tour';
 import { untranslated, worded, words_for } from '../tour/words';
-import { AuthorAbout } from './about';
+import { AuthorAbout, no_scene_words } from './about';
 import type { FilmPanel } from './film_panel';
 import { AuthorLanguage } from './language';
 import type { Preview } from './preview';
@@ -56,7 +57,9 @@ export class AuthorPanel {
 
   constructor(private readonly tools_: AuthorTools) {
     by_id('button-author', HTMLButtonElement).hidden = false;
-    this.about_ = new AuthorAbout((change, field) => this.edit_about(change, field));
+    this.about_ = new AuthorAbout((change, field) =>
+      this.edit_about(this.about_change(change), this.typed_in(field)),
+    );
     this.stops_ = new AuthorStops(
       by_id('author-stops', HTMLOListElement),
       this.stop_actions(),
@@ -114,7 +117,7 @@ export class AuthorPanel {
     const own = [...without(this.tools_.measures.own, measures), ...measures];
     this.draft_.load(tours, about, own);
     this.tools_.measures.enter(own, []);
-    this.language_.offer(tours);
+    this.language_.offer(tours, about);
     this.saved_ = this.draft_.state;
     this.start_ = undefined;
     this.show(0);
@@ -122,6 +125,17 @@ export class AuthorPanel {
       this.stops_.offer(scenes, this.tools_.navigation.scene_id);
       this.show();
     });
+  }
+
+  /** The change in the language that is edited. */
+  private about_change({ title, credits, ...other }: Partial<SceneAbout>): Partial<SceneAbout> {
+    const words = {
+      ...(title !== undefined && { title }),
+      ...(credits !== undefined && { credits }),
+    };
+    if (Object.keys(words).length === 0) return other;
+    const { about } = this.draft_.state;
+    return { ...other, ...texts_written(about, this.language_.value, words, no_scene_words) };
   }
 
   edit_about(change: Partial<SceneAbout>, field?: string): void {
@@ -366,7 +380,7 @@ export class AuthorPanel {
     this.title_.placeholder = language ? tour.title : text.author.tour_title;
     this.title_.lang = language;
     this.autoplay_.checked = tour.starts_itself;
-    this.about_.show(state.about);
+    this.about_.show(state.about, language);
     this.stops_.show(tour.stops, language, open_stop);
     const change = (sound: Partial<Tour>, field?: string): void => {
       this.draft_.edit_tour(sound, field);
@@ -375,7 +389,7 @@ export class AuthorPanel {
     };
     const sound = by_id('author-sound', HTMLElement);
     const has_focus = sound.contains(document.activeElement);
-    sound.replaceChildren(this.tools_.media.of_tour(tour, change));
+    sound.replaceChildren(this.tools_.media.of_tour(tour, language, change));
     if (has_focus) sound.querySelector<HTMLElement>('[data-control="sound"]')?.focus();
     this.show_what_can_be_done();
   }

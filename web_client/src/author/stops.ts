@@ -19,7 +19,11 @@ export interface MediaFields {
     language: string,
     change: (change: Partial<Stop>, field?: string) => void,
   ): HTMLElement;
-  of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement;
+  of_tour(
+    tour: Tour,
+    language: string,
+    change: (change: Partial<Tour>, field?: string) => void,
+  ): HTMLElement;
 }
 
 export interface StopActions {

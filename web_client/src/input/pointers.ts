@@ -101,6 +101,10 @@ const tap_slack_px = 10; // fingers and hands tremble
 const double_tap_ms = 350;
 const double_tap_px = 30;
 
+/** Whether a pointer that went down at the first point has stayed there. Places in px. */
+export const is_tap = (down_x: number, down_y: number, x: number, y: number): boolean =>
+  Math.hypot(x - down_x, y - down_y) <= tap_slack_px;
+
 /** Tells taps, clicks and double ones from drags. Times in ms, places in px. */
 export class Taps {
   private down_: { x: number; y: number } | undefined;
@@ -118,7 +122,7 @@ export class Taps {
   up(time_ms: number, x: number, y: number): 'drag' | 'tap' | 'double tap' {
     const { down_: down, last_: last } = this;
     this.down_ = this.last_ = undefined;
-    if (!down || Math.hypot(x - down.x, y - down.y) > tap_slack_px) return 'drag';
+    if (!down || !is_tap(down.x, down.y, x, y)) return 'drag';
     const is_second =
       last !== undefined &&
       time_ms - last.time_ms <= double_tap_ms &&
@@ -150,8 +154,7 @@ export class LongPress {
 
   /** The pointer is here. Returns whether a long press may still come; a drag ends it. */
   may_come(x: number, y: number): boolean {
-    if (this.pressed_ && Math.hypot(x - this.pressed_.x, y - this.pressed_.y) > tap_slack_px)
-      this.end();
+    if (this.pressed_ && !is_tap(this.pressed_.x, this.pressed_.y, x, y)) this.end();
     return this.pressed_ !== undefined;
   }
 

@@ -4,6 +4,7 @@ import type { Inertia } from '../camera/inertia';
 import type { Gesture } from '../camera/movement';
 import { is_for_page, position_of } from './key';
 import { HeldKeys } from './keyboard';
+import { capture } from './pass_drags';
 import {
   LongPress,
   pinch_steps,
@@ -152,15 +153,6 @@ function bind_wheel(
         listener.wheeled(pinch_steps(now / scale), true);
       scale = now;
     });
-}
-
-/** Pointers that an assistive tool makes up, or that are up by now, cannot be captured. */
-function capture(view: HTMLElement, pointer_id: number): void {
-  try {
-    view.setPointerCapture(pointer_id);
-  } catch (error) {
-    console.warn('a pointer cannot be captured', error);
-  }
 }
 
 function bind_keys(keys: HeldKeys, listener: ViewInputListener): void {

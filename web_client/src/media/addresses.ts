@@ -5,7 +5,7 @@ const renew_after_ms = 3600_000; // the server's signatures are valid for four h
 
 /**
  * Where the media of a scene are. Elements of a page cannot send a token, so visitors who have one get
- * signed addresses.
+ * signed addresses, as those do who have a pass.
  */
 export class MediaAddresses {
   private signature_: { readonly text: Promise<string>; readonly made_ms: number } | undefined;
@@ -14,6 +14,7 @@ export class MediaAddresses {
     private readonly page_url_: string,
     private readonly token_: string,
     private readonly scene_id_: string,
+    private readonly pass_: string,
   ) {}
 
   async of(src: string): Promise<string> {
@@ -22,7 +23,8 @@ export class MediaAddresses {
       this.page_url_,
       scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`),
     );
-    if (this.token_) address.searchParams.set('pass', await this.signature());
+    const pass = this.pass_ || (this.token_ && (await this.signature()));
+    if (pass) address.searchParams.set('pass', pass);
     return address.href;
   }
 

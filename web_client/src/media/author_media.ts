@@ -2,6 +2,7 @@
 import type { MediaFields } from '../author/stops';
 import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
+import { texts_for, texts_written } from '../text/translations';
 import { max_media, max_text_characters } from '../tour/limits';
 import {
   accepted,
@@ -10,6 +11,7 @@ import {
   usual_volume,
   type MediaKind,
   type Medium,
+  type Narration,
 } from '../tour/media';
 import type { Stop, Tour } from '../tour/tour';
 import { MediaFolder } from './media_folder';
@@ -23,6 +25,11 @@ interface Choice {
   readonly none: string; // how the choice of none is called
   readonly chosen: (name: string) => void;
 }
+
+// All texts and files that one language may have of its own.
+const no_voice = { src: '', captions: '' };
+const no_sound = { src: '' };
+const no_medium_texts = { alt: '', captions: '' };
 
 type SetMedium = (i: number, change: (medium: Medium) => Partial<Medium>, field?: string) => void;
 
@@ -60,16 +67,6 @@ export class AuthorMedia implements MediaFields {
     const rows = media.map((medium, i) =>
       this.row_of(medium, i, language, set, () => change(without(i))),
     );
-    const { narration } = stop();
-    const voice = this.choice({
-      label: words.narration,
-      control: 'voice',
-      kinds: ['audio'],
-      value: narration?.src ?? '',
-      none: words.none,
-      chosen: (src) =>
-        change({ narration: src ? { src, captions: narration?.captions ?? '' } : undefined }),
-    });
     const add = this.choice({
       label: words.add,
       control: 'medium',
@@ -82,19 +79,14 @@ export class AuthorMedia implements MediaFields {
         change({
           media: [
             ...(stop().media ?? []),
-            { src, kind, alt: '', alt_in: new Map(), language: '', captions: '' },
+            { src, kind, alt: '', translations: new Map(), language: '', captions: '' },
           ],
         });
       },
     });
-    const parts = [...rows, ...(media.length < max_media ? [add] : []), voice];
-    if (narration)
-      parts.push(
-        this.captions_of(narration.captions, narration.src, (captions) =>
-          change({ narration: { ...narration, captions } }),
-        ),
-      );
-    const count = media.length + (narration ? 1 : 0);
+    const voice = this.voice_of(stop().narration, language, change);
+    const parts = [...rows, ...(media.length < max_media ? [add] : []), ...voice];
+    const count = media.length + (stop().narration ? 1 : 0);
     return this.details(
       `stop ${n}`,
       count > 0 ? words.of_stop_count({ count }) : words.of_stop,
@@ -102,17 +94,61 @@ export class AuthorMedia implements MediaFields {
     );
   }
 
-  of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement {
+  private voice_of(
+    narration: Narration | undefined,
+    language: string,
+    change: (change: Partial<Stop>) => void,
+  ): HTMLElement[] {
+    const words = text.media;
+    const spoken = narration && texts_for(narration, language, no_voice);
+    const set_voice = (change_of_voice: Partial<typeof no_voice>): void => {
+      if (!narration) return;
+      const written = texts_written(narration, language, change_of_voice, no_voice);
+      change({ narration: { ...narration, ...written } });
+    };
+    const voice = this.choice({
+      label: words.narration,
+      control: 'voice',
+      kinds: ['audio'],
+      value: spoken?.src ?? '',
+      none: (language && narration?.src) || words.none,
+      chosen: (src) => {
+        if (narration && (src || language)) set_voice({ src });
+        else
+          change({ narration: src ? { src, captions: '', translations: new Map() } : undefined });
+      },
+    });
+    if (!narration || !spoken) return [voice];
+    const inherited = language && narration.captions;
+    return [
+      voice,
+      this.captions_of(spoken.captions, narration.src, inherited, (captions) =>
+        set_voice({ captions }),
+      ),
+    ];
+  }
+
+  of_tour(
+    tour: Tour,
+    language: string,
+    change: (change: Partial<Tour>, field?: string) => void,
+  ): HTMLElement {
     const words = text.media;
     const { sound } = tour;
     const choice = this.choice({
       label: words.sound,
       control: 'sound',
       kinds: ['audio'],
-      value: sound?.src ?? '',
-      none: words.none,
-      chosen: (src) =>
-        change({ sound: src ? { src, volume: sound?.volume ?? usual_volume } : undefined }),
+      value: sound ? texts_for(sound, language, no_sound).src : '',
+      none: (language && sound?.src) || words.none,
+      chosen: (src) => {
+        if (sound && (src || language))
+          change({ sound: { ...sound, ...texts_written(sound, language, { src }, no_sound) } });
+        else
+          change({
+            sound: src ? { src, volume: usual_volume, translations: new Map() } : undefined,
+          });
+      },
     });
     if (!sound) return choice;
     const volume = make('input', {
@@ -153,16 +189,20 @@ export class AuthorMedia implements MediaFields {
       button,
     );
     const row = make('section', {}, name, this.alt_of(medium, i, language, set));
-    const set_captions = (captions: string): void => set(i, () => ({ captions }));
-    if (medium.kind !== 'image')
-      row.append(this.captions_of(medium.captions, medium.src, set_captions));
+    const set_captions = (captions: string): void =>
+      set(i, (now) => texts_written(now, language, { captions }, no_medium_texts));
+    if (medium.kind !== 'image') {
+      const { captions } = texts_for(medium, language, no_medium_texts);
+      const inherited = language && medium.captions;
+      row.append(this.captions_of(captions, medium.src, inherited, set_captions));
+    }
     return row;
   }
 
   private alt_of(medium: Medium, i: number, language: string, set: SetMedium): HTMLElement {
     const own = language === '';
     const alt = make('input', {
-      value: own ? medium.alt : (medium.alt_in.get(language) ?? ''),
+      value: texts_for(medium, language, no_medium_texts).alt,
       maxLength: max_text_characters,
       dir: 'auto',
       lang: language,
@@ -173,20 +213,26 @@ export class AuthorMedia implements MediaFields {
     alt.dataset['control'] = `alt ${i}`;
     alt.addEventListener('input', () => {
       alt.setCustomValidity(''); // what the author was told (AuthorStops.demand)
-      const change = ({ alt_in }: Medium): Partial<Medium> =>
-        own ? { alt: alt.value } : { alt_in: new Map([...alt_in, [language, alt.value]]) };
+      const change = (now: Medium): Partial<Medium> =>
+        texts_written(now, language, { alt: alt.value }, no_medium_texts);
       set(i, change, `alt ${medium.src}`);
     });
     return alt;
   }
 
-  private captions_of(value: string, src: string, chosen: (name: string) => void): HTMLElement {
+  /** `inherited`: the file where none is chosen; '': none. */
+  private captions_of(
+    value: string,
+    src: string,
+    inherited: string,
+    chosen: (name: string) => void,
+  ): HTMLElement {
     return this.choice({
       label: text.media.captions_of({ name: src }),
       control: `captions ${src}`,
       kinds: ['captions'],
       value,
-      none: text.media.none,
+      none: inherited || text.media.none,
       chosen,
     });
   }

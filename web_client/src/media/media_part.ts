@@ -2,6 +2,7 @@
 import { browser_storage } from '../base/browser_storage';
 import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
+import type { AccessToken } from '../session/token';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import { MediaAddresses } from './addresses';
@@ -16,17 +17,17 @@ export class MediaPart {
   private readonly narrator_: Narrator;
   private readonly media_: StopMedia;
   private addresses_: MediaAddresses;
-  private addresses_for_ = ''; // scene and token
+  private addresses_for_ = ''; // scene, token and pass
   private tour_: Tour | undefined;
   private stop_: Stop | undefined;
   private playing_ = false;
 
   /** `enlarged`: as in TourMedia. */
   constructor(
-    private readonly token_: () => string,
+    private readonly token_: Pick<AccessToken, 'value' | 'pass'>,
     enlarged: () => void,
   ) {
-    this.addresses_ = new MediaAddresses(location.href, '', '');
+    this.addresses_ = new MediaAddresses(location.href, '', '', '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
       voice,
@@ -47,11 +48,12 @@ export class MediaPart {
   }
 
   show_tours(scene_id: string, tours: readonly Tour[]): void {
-    const token = this.token_();
+    const { value: token, pass } = this.token_;
     // Sounds begin again at another address, so an author's edit does not change it.
-    if (this.addresses_for_ !== `${scene_id} ${token}`)
-      this.addresses_ = new MediaAddresses(location.href, token, scene_id);
-    this.addresses_for_ = `${scene_id} ${token}`;
+    const addresses_for = `${scene_id} ${token} ${pass}`;
+    if (this.addresses_for_ !== addresses_for)
+      this.addresses_ = new MediaAddresses(location.href, token, scene_id, pass);
+    this.addresses_for_ = addresses_for;
     const sounds = ({ sound, stops }: Tour): boolean =>
       sound !== undefined ||
       stops.some(

@@ -3,6 +3,7 @@ import type { MediaFields } from '../author/stops';
 import { load_part } from '../base/load_part';
 import { Signal } from '../base/signal';
 import { make } from '../page/dom';
+import type { AccessToken } from '../session/token';
 import type { TourState } from '../tour/player';
 import { has_media, type Stop, type Tour } from '../tour/tour';
 import type { TourMediaPart } from '../ui/scene_tours';
@@ -19,7 +20,7 @@ export class TourMedia implements TourMediaPart {
   private state_: TourState | undefined;
   private arrived_ = false;
 
-  constructor(private readonly token_: () => string) {}
+  constructor(private readonly token_: Pick<AccessToken, 'value' | 'pass'>) {}
 
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     this.tours_ = [scene_id, tours];
@@ -80,8 +81,12 @@ export class TourMediaFields implements MediaFields {
     return this.filled((fields) => fields.of_stop(stop, n, language, change));
   }
 
-  of_tour(tour: Tour, change: (change: Partial<Tour>, field?: string) => void): HTMLElement {
-    return this.filled((fields) => fields.of_tour(tour, change));
+  of_tour(
+    tour: Tour,
+    language: string,
+    change: (change: Partial<Tour>, field?: string) => void,
+  ): HTMLElement {
+    return this.filled((fields) => fields.of_tour(tour, language, change));
   }
 
   private filled(fill: (fields: AuthorMedia) => HTMLElement): HTMLElement {

@@ -35,7 +35,7 @@ export function make_page_parts(token: AccessToken): PageParts {
   gate.opened.listen(() => notice.withdraw(text.page.click_first));
   const navigation = new Navigation(view, worker, clock, reduced_motion, gate);
   const toolbar = new Toolbar(navigation);
-  const seen = new SeenCamera(worker, navigation);
+  const seen = new SeenCamera(worker, navigation, view);
   const storage = browser_storage('localStorage');
   return { view, clock, worker, navigation, seen, toolbar, notice, token, storage, reduced_motion };
 }

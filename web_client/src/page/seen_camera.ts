@@ -5,23 +5,42 @@ import type { Navigation } from './navigation';
 
 /**
  * The camera of the picture that the visitor sees. A warped picture shows the newest camera, any other picture
- * its own pose. What is drawn over the picture follows that.
+ * its own pose. Another visitor's picture, which this one watches, has its own shape, and is all in the view.
+ * What is drawn over the picture follows that.
  */
 export class SeenCamera {
   readonly moved = new Signal<Eye>();
   private warps_ = false;
   private has_picture_ = false;
+  private watches_ = false;
+  private picture_aspect_ = 0;
 
-  constructor(worker: WorkerClient, navigation: Navigation) {
+  constructor(
+    worker: WorkerClient,
+    navigation: Navigation,
+    private readonly view_: HTMLElement,
+  ) {
     worker.on('presenter', ({ warps }) => {
       this.warps_ = warps;
     });
+    worker.on('welcome', ({ welcome }) => (this.watches_ = welcome.watching));
+    worker.on('config', ({ config: { widthPx, heightPx } }) => {
+      this.picture_aspect_ = widthPx / Math.max(1, heightPx);
+    });
     worker.on('presented', ({ pose, fov_y_rad }) => {
-      if (!this.warps_ || !this.has_picture_) this.moved.emit({ ...pose, fov_y_rad });
+      if (this.watches_) this.moved.emit(this.all_in_view({ ...pose, fov_y_rad }));
+      else if (!this.warps_ || !this.has_picture_) this.moved.emit({ ...pose, fov_y_rad });
       this.has_picture_ = true;
     });
     navigation.sampled.listen(({ eye }) => {
       if (this.warps_) this.moved.emit(eye);
     });
+  }
+
+  /** The camera of a picture that is all in the view, as that of a picture which fills it. */
+  private all_in_view(eye: Eye): Eye {
+    const { clientWidth, clientHeight } = this.view_;
+    const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
+    return { ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) };
   }
 }

@@ -90,6 +90,21 @@ export class SceneCoordinates {
   }
 }
 
+/** Numbers on the wire count from 1. */
+export const show_message = ({
+  tour_index = -1,
+  stop_index = -1,
+  arrived,
+}: {
+  readonly tour_index: number | undefined;
+  readonly stop_index: number | undefined;
+  readonly arrived: boolean;
+}): { tour: number; stop: number; arrived: boolean } => ({
+  tour: tour_index + 1,
+  stop: stop_index + 1,
+  arrived,
+});
+
 export function scene_setup(scene: SceneFacts): SceneSetup {
   const origin = vector_of(scene.origin);
   const position_of = (v: WireVector | undefined): Vec3 => add(vector_of(v), origin);

@@ -1,4 +1,7 @@
 import { ask_server, scene_path } from '../base/server';
+import { readers } from '../text/text';
+import { in_language, type Translations } from '../text/translations';
+import type { SceneFacts } from '../wire/wire';
 
 /** A scene that this visitor may see, as GET /api/scenes tells of it. */
 export interface SceneListing {
@@ -7,6 +10,23 @@ export interface SceneListing {
   readonly credits: string;
   readonly licence: string;
 }
+
+type ListedScene = SceneListing & { readonly translations?: Readonly<Record<string, object>> };
+
+/** The texts about a scene, and those in other languages. */
+export const scene_words = ({
+  title,
+  credits,
+  translations,
+}: SceneFacts): {
+  readonly title: string;
+  readonly credits: string;
+  readonly translations: Translations<{ readonly title: string; readonly credits: string }>;
+} => ({
+  title,
+  credits,
+  translations: new Map(translations.map(({ language, ...words }) => [language, words])),
+});
 
 /** The scenes that this token may see; empty when the server does not answer. */
 export async function list_scenes(
@@ -18,8 +38,10 @@ export async function list_scenes(
       signal: AbortSignal.timeout(5000),
     });
     if (!response.ok) return [];
-    const { scenes } = (await response.json()) as { scenes: readonly SceneListing[] };
-    return scenes;
+    const { scenes } = (await response.json()) as { scenes: readonly ListedScene[] };
+    return scenes.map(({ translations, ...scene }) =>
+      in_language({ ...scene, translations: new Map(Object.entries(translations ?? {})) }, readers),
+    );
   } catch (error) {
     console.warn('the list of scenes could not be read', error);
     return [];

@@ -8,6 +8,7 @@ import {
   type ClientBody,
   type Company,
   type FrameHeader,
+  type HiddenMarkers,
   type HelloInit,
   type Lead,
   type Picked,
@@ -38,6 +39,7 @@ interface SessionListener {
   stream_ended(): void;
   stats(stats: Stats): void;
   picked(picked: Picked): void;
+  hidden_markers(hidden: HiddenMarkers): void;
   /** Of the presentation that this session gives, watches or follows. */
   lead(lead: Lead): void;
   pinged(pinged: Pinged): void;
@@ -161,7 +163,7 @@ export class Session {
   private forget_scene(): void {
     this.last_pose_ = undefined;
     this.path_ = [];
-    this.kept_.delete('clip');
+    for (const kind of ['clip', 'markers', 'show'] as const) this.kept_.delete(kind);
   }
 
   private connect(): void {
@@ -267,6 +269,9 @@ export class Session {
         break;
       case 'picked':
         if (link === this.link_) this.listener_.picked(body.value);
+        break;
+      case 'hiddenMarkers':
+        if (link === this.link_) this.listener_.hidden_markers(body.value);
         break;
       case 'lead':
         if (link === this.link_) this.listener_.lead(body.value);

@@ -22,6 +22,8 @@ export function watch_token(href: string): string {
 
 /** The access token of this visitor; '' for none. The tab remembers it. */
 export class AccessToken {
+  /** Opens tours and media of the scene that this visitor watches; '': it watches none. */
+  pass = '';
   private value_: string;
 
   /**

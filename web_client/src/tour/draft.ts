@@ -2,14 +2,20 @@
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
+import { write_translations, type Translations } from '../text/translations';
 import { write_measures, type Measure } from './measures';
 import { write_tours, type Stop, type Tour } from './tour';
 import { untranslated } from './words';
 
-/** What visitors are told of a scene. Texts are empty where nothing is said. */
-export interface SceneAbout {
+/** The texts about a scene that may be in several languages. */
+export interface SceneWords {
   readonly title: string;
   readonly credits: string;
+}
+
+/** What visitors are told of a scene. Texts are empty where nothing is said. */
+export interface SceneAbout extends SceneWords {
+  readonly translations: Translations<SceneWords>;
   readonly licence: string;
   readonly mode: CameraMode | undefined;
   readonly background: string; // "#rrggbb"
@@ -19,6 +25,7 @@ export interface SceneAbout {
 export const nothing_said: SceneAbout = {
   title: '',
   credits: '',
+  translations: new Map(),
   licence: '',
   mode: undefined,
   background: '#000000',
@@ -170,12 +177,14 @@ export class TourDraft {
   /** The whole of `<scene>.json`: the facts of the scene and the tours. */
   sidecar(scene: SceneSetup): object {
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
-    const { title, credits, licence, mode, background, metres_per_unit } = this.state.about;
+    const { title, credits, translations, licence, mode, background, metres_per_unit } =
+      this.state.about;
     const { position, orientation } = scene.start_pose;
     const measures = write_measures(this.state.measures);
     return {
       ...(title && { title }),
       ...(credits && { credits }),
+      ...write_translations(translations),
       ...(licence && { licence }),
       ...(mode && { mode }),
       ...(background !== nothing_said.background && { background }),

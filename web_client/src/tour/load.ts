@@ -14,7 +14,7 @@ interface SceneTours {
   readonly problems: readonly string[];
 }
 
-interface TourDocument {
+export interface TourDocument {
   readonly tours?: unknown;
   readonly measures?: unknown;
   readonly settings?: unknown;
@@ -58,15 +58,20 @@ export function read_document(
   };
 }
 
-/** Empty where the server has no tours or does not answer. `may_save`: the token may save a sidecar. */
+/**
+ * Empty where the server has no tours or does not answer. `may_save`: the token may save a sidecar. `pass`: opens
+ * the scene in place of the token; '': there is none.
+ */
 export async function fetch_tours(
   page_url: string,
   token: string,
   scene_id: string,
+  pass = '',
 ): Promise<{ document: TourDocument; may_save: boolean }> {
   const nothing = { document: {}, may_save: false };
   try {
-    const response = await ask_server(page_url, token, scene_path(scene_id, 'tours'));
+    const query = pass && `?${new URLSearchParams({ pass }).toString()}`;
+    const response = await ask_server(page_url, token, scene_path(scene_id, `tours${query}`));
     return response.ok ? { ...nothing, ...((await response.json()) as object) } : nothing;
   } catch (error) {
     console.warn('the tours of the scene could not be read', error);

@@ -1,10 +1,11 @@
 // Measures that sidecars and links hold: lines through marks, with names. Pure.
 import { forward, length, normalize, short_coordinate } from '../base/vector';
 import type { Mark } from '../measure/measurement';
+import { in_language, write_translations } from '../text/translations';
 import { JsonField } from './json_field';
 import { max_linked_marks, max_linked_measures, max_marks, max_measures } from './limits';
-import { read_translations, write_translations } from './tour';
-import { in_language, untranslated, type Worded } from './words';
+import { read_words } from './tour';
+import { untranslated, type Worded } from './words';
 
 export interface Measure extends Worded {
   readonly marks: readonly Mark[];
@@ -52,7 +53,7 @@ function read_mark(mark: JsonField): Mark {
 function read_measure(measure: JsonField): Measure {
   return {
     title: measure.find('title')?.text() ?? '',
-    ...read_translations(measure),
+    ...read_words(measure),
     marks: measure.at('marks').at_least(2).elements(max_marks).map(read_mark),
   };
 }

@@ -1,11 +1,17 @@
 // What stops show and play besides words: pictures, films and sounds. Pure.
 import { text } from '../text/text';
+import { write_translations, type Translations } from '../text/translations';
 import type { JsonField } from './json_field';
-import { max_languages, max_media } from './limits';
-import { tag_for } from './words';
+import { max_media } from './limits';
+import { read_translations } from './words';
 
 export const media_kinds = ['image', 'video', 'audio'] as const;
 export type MediaKind = (typeof media_kinds)[number];
+
+interface MediumTexts {
+  readonly alt: string;
+  readonly captions: string;
+}
 
 /** A picture, film or sound that a stop shows. */
 export interface Medium {
@@ -14,8 +20,7 @@ export interface Medium {
   readonly kind: MediaKind;
   /** What it shows, for those who do not see it. Pictures always have one. */
   readonly alt: string;
-  /** The same by BCP 47 tag. */
-  readonly alt_in: ReadonlyMap<string, string>;
+  readonly translations: Translations<MediumTexts>;
   /** Tag of `alt`; '': its author did not say. */
   readonly language: string;
   /** Name of a .vtt file; '': none. */
@@ -26,12 +31,14 @@ export interface Medium {
 export interface Narration {
   readonly src: string;
   readonly captions: string;
+  readonly translations: Translations<Omit<Narration, 'translations'>>;
 }
 
 /** What is heard during a tour. `volume`: 0…1. */
 export interface TourSound {
   readonly src: string;
   readonly volume: number;
+  readonly translations: Translations<Pick<TourSound, 'src'>>;
 }
 
 export const usual_volume = 0.5;
@@ -85,11 +92,11 @@ export const read_media = (media: JsonField | undefined): readonly Medium[] | un
   media?.elements(max_media).map((field) => {
     const { src, kind } = read_source(field);
     const alt = (kind === 'image' ? field.at('alt') : field.find('alt'))?.text() ?? '';
-    const translations = field.find('translations')?.members(max_languages) ?? [];
-    const alt_in = new Map(
-      translations.map(([tag, words]) => [tag, words.find('alt')?.text() ?? '']),
-    );
-    return { src, kind, alt, alt_in, language: '', captions: read_captions(field) };
+    const translations = read_translations(field, (texts) => ({
+      alt: texts.find('alt')?.text() ?? '',
+      captions: read_captions(texts),
+    }));
+    return { src, kind, alt, translations, language: '', captions: read_captions(field) };
   });
 
 function read_sound(field: JsonField): string {
@@ -98,22 +105,25 @@ function read_sound(field: JsonField): string {
   return src;
 }
 
+/** In one language, where it may be missing. */
+const read_other_sound = (field: JsonField): string => (field.find('src') ? read_sound(field) : '');
+
 export const read_narration = (field: JsonField | undefined): Narration | undefined =>
-  field && { src: read_sound(field), captions: read_captions(field) };
+  field && {
+    src: read_sound(field),
+    captions: read_captions(field),
+    translations: read_translations(field, (spoken) => ({
+      src: read_other_sound(spoken),
+      captions: read_captions(spoken),
+    })),
+  };
 
 export const read_tour_sound = (field: JsonField | undefined): TourSound | undefined =>
-  field && { src: read_sound(field), volume: field.find('volume')?.number(0, 1) ?? usual_volume };
-
-/** The media as a visitor reads of them, in the first of these languages that each has. */
-export const media_for = (
-  media: readonly Medium[],
-  readers: readonly string[],
-): readonly Medium[] =>
-  media.map((medium) => {
-    const language = tag_for([...medium.alt_in.keys()], readers);
-    const alt = language === undefined ? '' : medium.alt_in.get(language);
-    return language !== undefined && alt ? { ...medium, alt, language } : medium;
-  });
+  field && {
+    src: read_sound(field),
+    volume: field.find('volume')?.number(0, 1) ?? usual_volume,
+    translations: read_translations(field, (sound) => ({ src: read_other_sound(sound) })),
+  };
 
 const write_source = (src: string, kind: MediaKind): object => ({
   src,
@@ -122,24 +132,31 @@ const write_source = (src: string, kind: MediaKind): object => ({
 
 /** Writes what read_media() reads. */
 export const write_media = (media: readonly Medium[]): unknown[] =>
-  media.map(({ src, kind, alt, alt_in, captions }) => {
-    const translations = [...alt_in].flatMap(([tag, words]) =>
-      words ? [[tag, { alt: words }] as const] : [],
-    );
-    return {
-      ...write_source(src, kind),
-      ...(alt && { alt }),
-      ...(captions && { captions }),
-      ...(translations.length > 0 && { translations: Object.fromEntries(translations) }),
-    };
-  });
+  media.map(({ src, kind, alt, captions, translations }) => ({
+    ...write_source(src, kind),
+    ...(alt && { alt }),
+    ...(captions && { captions }),
+    ...write_translations(translations),
+  }));
 
-export const write_narration = ({ src, captions }: Narration): object => ({
+const write_sounds = (sounds: Translations<Pick<TourSound, 'src'>>): object =>
+  write_translations(
+    new Map(
+      [...sounds].map(([tag, sound]) => [
+        tag,
+        { ...sound, ...(sound.src && write_source(sound.src, 'audio')) },
+      ]),
+    ),
+  );
+
+export const write_narration = ({ src, captions, translations }: Narration): object => ({
   ...write_source(src, 'audio'),
   ...(captions && { captions }),
+  ...write_sounds(translations),
 });
 
-export const write_tour_sound = ({ src, volume }: TourSound): object => ({
+export const write_tour_sound = ({ src, volume, translations }: TourSound): object => ({
   ...write_source(src, 'audio'),
   ...(volume !== usual_volume && { volume }),
+  ...write_sounds(translations),
 });

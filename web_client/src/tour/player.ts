@@ -99,6 +99,17 @@ export class TourPlayer {
     this.env_.reached(this.tour_index_, stop_index);
   }
 
+  /** Shows a stop, or the tour alone, to a visitor whose camera somebody else leads. */
+  be_shown(tour_index: number, stop_index: number | undefined): void {
+    const tour = this.tours_[tour_index];
+    if (!tour) return;
+    this.set_out();
+    this.playing_ = false;
+    this.tour_index_ = tour_index;
+    this.stop_index_ = stop_index !== undefined && tour.stops[stop_index] ? stop_index : undefined;
+    this.tell();
+  }
+
   next(): void {
     this.go_by(1);
   }

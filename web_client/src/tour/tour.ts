@@ -3,10 +3,10 @@ import { look_at, short_coordinate, type Quat, type Vec3 } from '../base/vector'
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
 import { text } from '../text/text';
+import { in_language, write_translations } from '../text/translations';
 import { JsonField } from './json_field';
-import { longest_flight_s, longest_stay_s, max_languages, max_stops, max_tours } from './limits';
+import { longest_flight_s, longest_stay_s, max_stops, max_tours } from './limits';
 import {
-  media_for,
   read_media,
   read_narration,
   read_tour_sound,
@@ -17,7 +17,7 @@ import {
   type Narration,
   type TourSound,
 } from './media';
-import { in_language, type Worded } from './words';
+import { read_translations, untranslated, type Worded } from './words';
 
 /** A way into another scene: to a view of it, to a stop of one of its tours, or to where visits begin there. */
 export interface Portal {
@@ -80,7 +80,7 @@ export const flight_to = (stop: Stop, from: Eye, reach: number): Flight =>
 export function read_tours(document: unknown, up: Vec3, fov_y_rad: number): Tour[] {
   return new JsonField('tours', document).elements(max_tours).map((tour) => ({
     title: tour.find('title')?.text() ?? '',
-    ...read_translations(tour),
+    ...read_words(tour),
     stops: tour
       .at('stops')
       .elements(max_stops)
@@ -98,7 +98,7 @@ function read_stop(stop: JsonField, up: Vec3, fov_y_rad: number): Stop {
   return {
     title: stop.find('title')?.text() ?? '',
     caption: stop.find('caption')?.text() ?? '',
-    ...read_translations(stop),
+    ...read_words(stop),
     eye: { position, orientation, fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad },
     marker: stop.find('marker')?.vec3(),
     stay_s: stop.find('stay_s')?.number(0, longest_stay_s),
@@ -133,24 +133,23 @@ function read_portal(portal: JsonField | undefined): Portal | undefined {
   };
 }
 
-export function read_translations(item: JsonField): Pick<Worded, 'translations' | 'language'> {
-  const written = item.find('translations')?.members(max_languages) ?? [];
-  const translations = new Map(
-    written.map(([tag, words]) => [
-      tag,
-      { title: words.find('title')?.text() ?? '', caption: words.find('caption')?.text() ?? '' },
-    ]),
-  );
-  return { translations, language: '' };
-}
+export const read_words = (item: JsonField): Pick<Worded, 'translations' | 'language'> => ({
+  ...untranslated,
+  translations: read_translations(item, (words) => ({
+    title: words.find('title')?.text() ?? '',
+    caption: words.find('caption')?.text() ?? '',
+  })),
+});
 
-/** The tours as a visitor reads them, in the first of these languages that each text has. */
+/** The tours as a visitor reads and hears them, in the first of these languages that each part has. */
 export const tours_for = (tours: readonly Tour[], readers: readonly string[]): readonly Tour[] =>
   tours.map((tour) => ({
     ...in_language(tour, readers),
+    sound: tour.sound && in_language(tour.sound, readers),
     stops: tour.stops.map((stop) => ({
       ...in_language(stop, readers),
-      media: stop.media && media_for(stop.media, readers),
+      media: stop.media?.map((medium) => in_language(medium, readers)),
+      narration: stop.narration && in_language(stop.narration, readers),
     })),
   }));
 
@@ -195,13 +194,4 @@ function write_portal({ scene, view, tour_index, stop_index }: Portal): object {
     ...(tour_index !== undefined && { tour: tour_index + 1 }),
     ...(stop_index !== undefined && { stop: stop_index + 1 }),
   };
-}
-
-export function write_translations(translations: Worded['translations']): object {
-  const written = [...translations].flatMap(([tag, { title, caption }]) =>
-    title || caption
-      ? [[tag, { ...(title && { title }), ...(caption && { caption }) }] as const]
-      : [],
-  );
-  return written.length > 0 ? { translations: Object.fromEntries(written) } : {};
 }

@@ -1,5 +1,7 @@
 // Titles and captions of tours, in the languages that their authors wrote. Pure.
-import { primary } from '../text/language';
+import { texts_for, translated, type Translations } from '../text/translations';
+import type { JsonField } from './json_field';
+import { max_languages } from './limits';
 
 interface Words {
   readonly title: string;
@@ -9,8 +11,7 @@ interface Words {
 /** What a visitor reads of a tour or a stop. */
 export interface Worded extends Partial<Words> {
   readonly title: string;
-  /** By BCP 47 tag. A word that is empty there comes from the fields above. */
-  readonly translations: ReadonlyMap<string, Words>;
+  readonly translations: Translations<Words>;
   /** Tag of the fields above; '': its author did not say. */
   readonly language: string;
 }
@@ -21,30 +22,11 @@ export const untranslated: Pick<Worded, 'translations' | 'language'> = {
   language: '',
 };
 
-/** The tag for the first of `readers` that has one; undefined: none has. */
-export function tag_for(tags: readonly string[], readers: readonly string[]): string | undefined {
-  for (const reader of readers) {
-    const found =
-      tags.find((tag) => tag.toLowerCase() === reader.toLowerCase()) ??
-      tags.find((tag) => primary(tag) === primary(reader));
-    if (found !== undefined) return found;
-  }
-  return undefined;
-}
-
-/** The same in the first language of `readers` that it has a translation for. */
-export function in_language<T extends Worded>(item: T, readers: readonly string[]): T {
-  const language = tag_for([...item.translations.keys()], readers);
-  if (language === undefined) return item;
-  const { title, caption } = item.translations.get(language)!;
-  return { ...item, language, ...(title && { title }), ...(caption && { caption }) };
-}
+const no_words: Words = { title: '', caption: '' };
 
 /** What an author has written for this language; '' for the words that all others get. */
-export function words_for({ title, caption = '', translations }: Worded, language: string): Words {
-  if (language === '') return { title, caption };
-  return translations.get(language) ?? { title: '', caption: '' };
-}
+export const words_for = (item: Worded, language: string): Words =>
+  texts_for(item, language, no_words);
 
 /** The change of a tour or a stop that writes these words for one language. */
 export function worded<C extends Partial<Worded>>(
@@ -54,7 +36,21 @@ export function worded<C extends Partial<Worded>>(
 ): C | (Omit<C, keyof Words> & Pick<Worded, 'translations'>) {
   const { title, caption, ...other } = change;
   if (language === '' || (title === undefined && caption === undefined)) return change;
-  const before = words_for(item, language);
-  const words = { title: title ?? before.title, caption: caption ?? before.caption };
-  return { ...other, translations: new Map([...item.translations, [language, words]]) };
+  const words = {
+    ...(title !== undefined && { title }),
+    ...(caption !== undefined && { caption }),
+  };
+  return { ...other, ...translated(item, language, words, no_words) };
 }
+
+/** `read`: the texts in one language. */
+export const read_translations = <Texts>(
+  item: JsonField,
+  read: (texts: JsonField) => Texts,
+): Translations<Texts> =>
+  new Map(
+    (item.find('translations')?.members(max_languages) ?? []).map(([tag, texts]) => [
+      tag,
+      read(texts),
+    ]),
+  );

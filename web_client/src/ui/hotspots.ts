@@ -1,8 +1,9 @@
 import type { Eye } from '../camera/eye';
 import { project } from '../camera/ray';
 import { caption_words } from '../captions/caption';
+import { pass_drags } from '../input/pass_drags';
 import { by_id, icon, make } from '../page/dom';
-import type { SeenCamera } from '../page/seen_camera';
+import type { PageParts } from '../page/parts';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
 import type { TourState } from '../tour/player';
@@ -15,10 +16,12 @@ export class Hotspots {
   private tour_: Tour | undefined;
   private stop_: Stop | undefined; // where the tour is
   private spots_: { readonly stop: Stop; readonly button: HTMLButtonElement }[] = [];
+  private asked_ = 0; // sets of markers that the server was asked about
+  private asked_about_ = ''; // the last one
+  private behind_: readonly number[] = []; // indices of those that something in the scene covers
 
   constructor(
-    private readonly view_: HTMLElement,
-    seen: SeenCamera,
+    private readonly parts_: Pick<PageParts, 'view' | 'seen' | 'worker' | 'navigation'>,
     private readonly scenes_: PortalScenes,
     private readonly go_to_: (stop_index: number) => void,
   ) {
@@ -26,7 +29,13 @@ export class Hotspots {
       // A label may hide what is behind it (WCAG 1.4.13).
       if (key === 'Escape') this.host_.classList.add('labels-dismissed');
     });
-    seen.moved.listen((eye) => this.put(eye));
+    parts_.seen.moved.listen((eye) => this.put(eye));
+    parts_.navigation.entered.listen(() => (this.asked_about_ = ''));
+    parts_.worker.on('hidden_markers', ({ id, indices }) => {
+      if (id !== this.asked_) return; // an answer about other markers
+      this.behind_ = indices;
+      this.show_behind();
+    });
   }
 
   /** `eye`: the camera of the view. */
@@ -43,7 +52,7 @@ export class Hotspots {
   }
 
   private put(eye: Eye): void {
-    const { clientWidth: width_px, clientHeight: height_px } = this.view_;
+    const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
     for (const { stop, button } of this.spots_) {
       const at = stop.marker && project(stop.marker, eye, width_px / height_px);
       const inside = at && at[0] > 0 && at[0] < 1 && at[1] > 0 && at[1] < 1 ? at : undefined;
@@ -57,6 +66,7 @@ export class Hotspots {
 
   private show_tour(tour: Tour | undefined): void {
     this.tour_ = tour;
+    const { view } = this.parts_;
     this.spots_ = (tour?.stops ?? []).flatMap((stop, i) => {
       if (!stop.marker) return [];
       const target = stop.portal && this.scenes_.target_of(stop.portal);
@@ -65,10 +75,11 @@ export class Hotspots {
       const button = make('button', { type: 'button', className: 'hotspot', hidden: true }, sign);
       button.classList.toggle('portal', target !== undefined);
       button.append(label_of(stop, i, button, target && text.portals.to({ scene: target.title })));
+      pass_drags(button, view);
       button.addEventListener('click', () => this.go_to_(i));
       // Whoever zooms where a hotspot is means the view.
       button.addEventListener('wheel', (event) => {
-        if (!this.view_.dispatchEvent(new WheelEvent(event.type, event))) event.preventDefault();
+        if (!view.dispatchEvent(new WheelEvent(event.type, event))) event.preventDefault();
       });
       for (const arrival of ['pointerenter', 'focus']) {
         button.addEventListener(arrival, () => this.host_.classList.remove('labels-dismissed'));
@@ -76,6 +87,25 @@ export class Hotspots {
       return [{ stop, button }];
     });
     this.host_.replaceChildren(...this.spots_.map(({ button }) => button));
+    this.ask();
+  }
+
+  /** Asks the server which hotspots the scene hides from here on. */
+  private ask(): void {
+    const points = this.spots_.map(({ stop }) => stop.marker!);
+    const about = JSON.stringify(points);
+    if (about !== this.asked_about_) {
+      this.behind_ = [];
+      this.asked_about_ = about;
+      this.parts_.worker.post({ kind: 'markers', id: ++this.asked_, points });
+    }
+    this.show_behind();
+  }
+
+  private show_behind(): void {
+    this.spots_.forEach(({ button }, i) =>
+      button.classList.toggle('behind', this.behind_.includes(i)),
+    );
   }
 }
 

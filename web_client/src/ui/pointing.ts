@@ -22,7 +22,6 @@ export class Pointing {
   private readonly host_ = by_id('pings', HTMLElement);
   private shown_: readonly Shown[] = [];
   private eye_: Eye | undefined; // of the picture that the visitor sees
-  private picture_aspect_ = 0;
 
   constructor(
     private readonly parts_: Pick<PageParts, 'view' | 'worker' | 'navigation' | 'notice' | 'seen'>,
@@ -30,10 +29,6 @@ export class Pointing {
     const { worker, seen } = parts_;
     worker.on('pinged', ({ point, by_host, name }) =>
       this.show(point, by_host ? words.by_host({ name }) : words.by_other),
-    );
-    worker.on(
-      'config',
-      ({ config }) => (this.picture_aspect_ = config.widthPx / Math.max(1, config.heightPx)),
     );
     seen.moved.listen((eye) => this.see(eye));
     on_click('shared-tour-point', () => void this.point_at(0.5, 0.5));
@@ -51,13 +46,6 @@ export class Pointing {
     if (how === 'press') void this.point_at(x, y);
     return how === 'press';
   };
-
-  /** The camera of the host's picture, which this visitor watches. It has its own shape, and is all in the view. */
-  watch(eye: Eye): void {
-    const { clientWidth, clientHeight } = this.parts_.view;
-    const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
-    this.see({ ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) });
-  }
 
   private see(eye: Eye): void {
     this.eye_ = eye;

@@ -2,10 +2,10 @@
 import type { TourEditor } from '../author/tour_editor';
 import type { PageParts } from '../page/parts';
 import { start_mode } from '../session/camera_messages';
-import { scene_name } from '../session/scenes';
+import { scene_name, scene_words } from '../session/scenes';
 import { readers, text } from '../text/text';
 import type { SceneAbout } from '../tour/draft';
-import { fetch_tours, read_document } from '../tour/load';
+import { fetch_tours, read_document, type TourDocument } from '../tour/load';
 import type { MeasureList } from '../tour/measure_list';
 import { measures_for, measures_of_link, type Measure } from '../tour/measures';
 import { read_shared } from '../tour/share';
@@ -38,6 +38,9 @@ export class SceneEntry {
     const { travel, views } = parts_;
     page_.navigation.entered.listen(({ scene }) => void this.enter(scene));
     page_.navigation.up_changed.listen(() => page_.notice.withdraw(text.quality.up_doubtful));
+    page_.worker.on('welcome', ({ welcome: { watching, scene, scenePass } }) => {
+      if (watching && scene && scenePass) void this.watch(scene.sceneId, scenePass);
+    });
     window.addEventListener('hashchange', () => {
       if (travel.leads_elsewhere) return;
       const shared = read_shared(location.href);
@@ -51,10 +54,11 @@ export class SceneEntry {
 
   private async enter(scene: SceneFacts): Promise<void> {
     const scene_id = scene.sceneId;
-    const { navigation, view, notice, toolbar } = this.page_;
+    const { navigation, notice, toolbar } = this.page_;
     const { scenes, tours: shown, views, travel, editor, embed, measures: list } = this.parts_;
     const token = this.page_.token.value;
     const load = ++this.loads_;
+    this.page_.token.pass = '';
     const arrival = travel.arrive(scene_id);
     const shared = arrival ?? read_shared(location.href);
     const linked = measures_of_link(arrival ? location.origin : location.href);
@@ -70,8 +74,7 @@ export class SceneEntry {
     const { document, may_save } = await fetch_tours(location.href, token, scene_id);
     if (load !== this.loads_) return; // the visitor entered another scene meanwhile
     const { camera } = navigation;
-    const aspect = view.clientWidth / Math.max(1, view.clientHeight);
-    const read = read_document(document, camera.up, camera.fov_y_rad, aspect);
+    const read = this.read(document);
     const { tours, start, problems, measures } = read;
     await scenes.learn(tours);
     if (load !== this.loads_) return;
@@ -89,7 +92,7 @@ export class SceneEntry {
     else list.enter(list.own, measures_for(measures, readers));
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const has_view = shared.eye !== undefined || shared.stop_index !== undefined;
-    shown.player.load(readable, has_view || editor !== undefined || navigation.led);
+    shown.load(readable, has_view || editor !== undefined || navigation.led);
     if (load === 1 && editor) toolbar.open('author');
     views.show_stop(shared, true);
     travel.arrived();
@@ -107,13 +110,37 @@ export class SceneEntry {
     // Frames of other pages have no panels.
     if (!document.body.classList.contains('bare')) this.page_.toolbar.open('measure');
   }
+
+  /** Gets ready to show what the host shows of this scene's tours. */
+  private async watch(scene_id: string, pass: string): Promise<void> {
+    const load = ++this.loads_;
+    const { token } = this.page_;
+    const { document } = await fetch_tours(location.href, token.value, scene_id, pass);
+    if (load !== this.loads_) return;
+    token.pass = pass;
+    const { tours: shown } = this.parts_;
+    const readable = tours_for(this.read(document).tours, readers);
+    shown.offer(readable, scene_id);
+    shown.load(readable, true);
+  }
+
+  private read(document: TourDocument): ReturnType<typeof read_document> {
+    const { navigation, view } = this.page_;
+    const { up, fov_y_rad } = navigation.camera;
+    return read_document(
+      document,
+      up,
+      fov_y_rad,
+      view.clientWidth / Math.max(1, view.clientHeight),
+    );
+  }
 }
 
 /** What the scene's sidecar says. The name of its file is no title. */
 function about_of(scene: SceneFacts): SceneAbout {
   return {
+    ...scene_words(scene),
     title: scene.title === scene_name(scene.sceneId) ? '' : scene.title,
-    credits: scene.credits,
     licence: scene.licence,
     mode: start_mode(scene),
     background: css_colour(scene.backgroundRgb),

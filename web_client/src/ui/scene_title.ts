@@ -1,16 +1,24 @@
 import { by_id, make } from '../page/dom';
-import { credit_line, scene_address } from '../session/scenes';
+import { credit_line, scene_address, scene_words } from '../session/scenes';
 import { number } from '../text/number';
-import { text } from '../text/text';
+import { readers, text } from '../text/text';
+import { in_language } from '../text/translations';
 import type { SceneFacts } from '../wire/wire';
 
 /** Shows the name of the scene and whom it is from. `several`: this visitor may see other scenes, too. */
 export function show_scene_title(scene: SceneFacts, several: boolean): void {
-  const name = scene.title || scene.sceneId;
+  const { title, credits, language: lang = '' } = in_language(scene_words(scene), readers);
+  const name = title || scene.sceneId;
   const count = text.scene.gaussians({ count: number(scene.gaussians) });
   const what = scene.model === '' ? count : `${count}, ${scene.model}`;
-  by_id('scene-name', HTMLElement).replaceChildren(make('bdi', {}, name), make('small', {}, what));
-  by_id('scene-credits', HTMLElement).textContent = credit_line(scene);
+  by_id('scene-name', HTMLElement).replaceChildren(
+    make('bdi', { lang }, name),
+    make('small', {}, what),
+  );
+  by_id('scene-credits', HTMLElement).textContent = credit_line({
+    credits,
+    licence: scene.licence,
+  });
   const all = by_id('all-scenes', HTMLAnchorElement);
   all.href = scene_address(location.href);
   all.hidden = !several;

@@ -9,6 +9,7 @@ import { watch_token } from '../session/token';
 import { text } from '../text/text';
 import { presentation_address } from '../tour/share';
 import { Lead_State, type Lead, type Welcome } from '../wire/wire';
+import type { ShownStop } from '../worker/messages';
 import type { Pointing } from './pointing';
 
 const { shared_tour: words } = text;
@@ -24,6 +25,8 @@ export class SharedTour {
   /** The visitor takes part no more. */
   readonly left = new Signal();
   readonly takes_part = new Signal<boolean>();
+  /** To participants: what their host sees. */
+  readonly shown = new Signal<ShownStop>();
   private role_: Role = 'alone';
   private lead_: Lead | undefined;
   private host_eye_: Eye | undefined;
@@ -60,7 +63,6 @@ export class SharedTour {
     worker.on('presented', ({ pose, fov_y_rad }) => {
       if (this.role_ !== 'watching') return;
       this.host_eye_ = { ...pose, fov_y_rad };
-      pointing_.watch(this.host_eye_);
     });
     navigation.entered.listen(() => {
       // A visitor who watched continues from the host's view.
@@ -99,6 +101,8 @@ export class SharedTour {
       else if (this.wants_) this.go_along();
     } else if (eye && this.wants_) this.follow(eye);
     if (this.role_ === 'following' && differ(before, lead)) this.show();
+    if (lead.shown && (this.role_ === 'following' || this.role_ === 'watching'))
+      this.shown.emit(stop_of(lead.shown));
   }
 
   /** A later presentation does not bring the visitor back. */
@@ -217,6 +221,7 @@ export class SharedTour {
     this.takes_part.emit(!is_out);
     const watching = role === 'watching';
     document.body.classList.toggle('watching', watching);
+    by_id('hotspots', HTMLElement).inert = watching;
     this.parts_.toolbar.watching = watching;
     this.view_.setAttribute('role', watching ? 'img' : 'application');
     const presenting = role === 'presenting';
@@ -259,6 +264,13 @@ export class SharedTour {
     );
   }
 }
+
+/** Numbers on the wire count from 1. */
+const stop_of = ({ tour, stop, arrived }: NonNullable<Lead['shown']>): ShownStop => ({
+  tour_index: tour > 0 ? tour - 1 : undefined,
+  stop_index: stop > 0 ? stop - 1 : undefined,
+  arrived,
+});
 
 /** Whether more than the camera is new. */
 const differ = (a: Lead | undefined, b: Lead): boolean =>

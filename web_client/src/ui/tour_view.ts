@@ -44,6 +44,7 @@ export class TourView {
         return; // a click
       const action = actions[position_of(event)];
       if (!action || !this.has_tours_ || !is_for_page(event)) return;
+      if (document.body.classList.contains('watching')) return; // the host leads
       event.preventDefault();
       action();
     });

@@ -15,6 +15,13 @@ import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, Hello_Device, Lead, StreamConfig, Welcome } from '../wire/wire';
 
+/** A stop of a tour, or no more than the tour, or nothing. */
+export interface ShownStop {
+  readonly tour_index: number | undefined;
+  readonly stop_index: number | undefined;
+  readonly arrived: boolean; // the camera is at the stop
+}
+
 export interface Snapshot {
   /** Header of the newest picture. */
   readonly header: FrameHeader;
@@ -53,6 +60,10 @@ export type ToWorker =
   | { kind: 'prepare'; scene_id: string }
   /** Undefined: nothing is left out. */
   | { kind: 'clip'; plane: ClipPlane | undefined }
+  /** Which of these points does the scene hide? 'hidden_markers' answers, and tells of changes. */
+  | { kind: 'markers'; id: number; points: readonly Vec3[] }
+  /** What the visitor sees of the tours, for those in a shared tour with them. */
+  | { kind: 'show'; shown: ShownStop }
   | { kind: 'hidden'; hidden: boolean }
   | { kind: 'retry' }
   | { kind: 'token'; token: string }
@@ -86,6 +97,7 @@ export type FromWorker =
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `hit`: undefined where nothing is there. */
   | { kind: 'picked'; id: number; hit: Hit | undefined }
+  | { kind: 'hidden_markers'; id: number; indices: readonly number[] }
   /** `eye`: where the host's camera is, for those who follow. */
   | { kind: 'lead'; lead: Lead; eye: Eye | undefined }
   /** Somebody in the shared tour points there. `name`: of the host. */

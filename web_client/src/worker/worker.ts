@@ -10,13 +10,19 @@ import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
 import { widened_fov } from '../present/warp';
-import { eye_of, pose_message, SceneCoordinates } from '../session/camera_messages';
+import { eye_of, pose_message, SceneCoordinates, show_message } from '../session/camera_messages';
 import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import type { SessionState } from '../session/state';
 import { Metrics } from '../stats/metrics';
 import { endpoint_of, open_web_socket } from '../transport/socket';
-import { Codec, type FrameHeader, type SettingsInit, type StreamConfig } from '../wire/wire';
+import {
+  Codec,
+  type FrameHeader,
+  type Lead,
+  type SettingsInit,
+  type StreamConfig,
+} from '../wire/wire';
 import { aspect_of, frame_sizes } from './frame_sizes';
 import type { FromWorker, ToWorker } from './messages';
 
@@ -115,8 +121,11 @@ class Client {
       case 'pick':
         this.pick(message);
         break;
+      case 'markers':
+      case 'show':
       case 'clip':
-        this.session_.keep({ case: 'clip', value: this.coordinates_.clip_message(message.plane) });
+      case 'follow':
+        this.keep(message);
         break;
       case 'select':
         this.session_.select_scene(message.scene_id);
@@ -138,9 +147,6 @@ class Client {
         this.session_.keep({ case: 'follow', value: { watch: message.watch } });
         this.session_.greet_anew({ watch: message.watch, follow: true });
         break;
-      case 'follow':
-        this.session_.keep({ case: 'follow', value: { watch: message.watch } });
-        break;
       case 'present':
         this.present(message);
         break;
@@ -160,6 +166,19 @@ class Client {
       case 'get_snapshot':
         this.post_snapshot(message.request);
         break;
+    }
+  }
+
+  private keep(message: Extract<ToWorker, { kind: 'markers' | 'show' | 'clip' | 'follow' }>): void {
+    if (message.kind === 'show')
+      this.session_.keep({ case: 'show', value: show_message(message.shown) });
+    else if (message.kind === 'clip')
+      this.session_.keep({ case: 'clip', value: this.coordinates_.clip_message(message.plane) });
+    else if (message.kind === 'follow')
+      this.session_.keep({ case: 'follow', value: { watch: message.watch } });
+    else {
+      const points = message.points.map(this.coordinates_.point_message);
+      this.session_.keep({ case: 'markers', value: { id: message.id, points } });
     }
   }
 
@@ -264,16 +283,8 @@ class Client {
         stats: (stats) => this.metrics_.server_said(stats),
         picked: ({ id, hit, distance, spread }) =>
           say({ kind: 'picked', id, hit: hit ? { distance, spread } : undefined }),
-        lead: (lead) => {
-          this.host_ = lead.name;
-          const { camera } = lead;
-          say({
-            kind: 'lead',
-            lead,
-            eye:
-              camera && this.coordinates_.to_file(eye_of(camera.worldFromCamera, camera.fovYRad)),
-          });
-        },
+        hidden_markers: ({ id, indices }) => say({ kind: 'hidden_markers', id, indices }),
+        lead: (lead) => this.led(lead),
         pinged: ({ place, byLeader }) => {
           if (place)
             say({
@@ -303,6 +314,13 @@ class Client {
         settings: this.frame_sizes(),
       },
     );
+  }
+
+  private led(lead: Lead): void {
+    this.host_ = lead.name;
+    const { camera } = lead;
+    const eye = camera && this.coordinates_.to_file(eye_of(camera.worldFromCamera, camera.fovYRad));
+    say({ kind: 'lead', lead, eye });
   }
 
   private take_camera(sample: CameraSample): void {

@@ -53,6 +53,18 @@ TEST(SurfacePoints, DepthOfTheLightIsReported) {
   EXPECT_LT(hit->spread, 0.5f);
 }
 
+TEST(SurfacePoints, LightIsStoppedByWhatIsBeforeItAlone) {
+  GaussianCloud cloud;
+  add_wall(cloud, 20, 5.0f, 0.9f);
+  add_wall(cloud, 20, 9.0f, 0.9f);
+  const SurfacePoints surface(cloud, pool);
+  const glm::vec3 origin(0.1f, 0.0f, 0.0f);
+  EXPECT_EQ(surface.light_from(origin, ahead, 4.9f, 0.1f), 1.0f);
+  EXPECT_LT(surface.light_from(origin, ahead, 5.1f, 0.1f), 0.1f);
+  EXPECT_EQ(surface.light_from(glm::vec3(0.0f, 0.0f, 6.0f), ahead, 2.9f, 0.1f), 1.0f);
+  EXPECT_EQ(surface.light_from(origin, -ahead, 50.0f, 0.1f), 1.0f);
+}
+
 TEST(SurfacePoints, EmptyDirectionsHaveNoHit) {
   GaussianCloud cloud;
   add_wall(cloud, 20, 5.0f, 0.9f);

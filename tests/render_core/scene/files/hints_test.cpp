@@ -63,6 +63,14 @@ TEST(Sidecar, TextsForVisitorsAreRead) {
   EXPECT_EQ(parse_sidecar("{}").about, SceneAbout());
 }
 
+TEST(Sidecar, TextsForVisitorsMayBeInSeveralLanguages) {
+  const SceneAbout about = parse_sidecar(R"({"title": "The hall", "translations": {
+    "de": {"title": "Die Halle", "credits": "Ada\u202e"}, "fr": {"title": "La salle"}}})")
+                               .about;
+  EXPECT_EQ(about.translations, (std::vector<SceneWords>{{"de", "Die Halle", "Ada\\xe2\\x80\\xae"},
+                                                         {"fr", "La salle"}}));
+}
+
 TEST(Sidecar, ErrorsNameTheField) {
   struct Text {
     std::string text;
@@ -72,6 +80,11 @@ TEST(Sidecar, ErrorsNameTheField) {
   std::vector<Text> texts = {
       {R"({"title": 1})", "title"},
       {R"({"credits": ")" + std::string(801, 'a') + "\"}", "credits"},
+      {R"({"translations": []})", "translations"},
+      {R"({"translations": {"d_": {}}})", "translations"},
+      {R"({"translations": {"de": {"licence": "MIT"}}})", "translations.de"},
+      {R"({"translations": {"de": {"title": ")" + std::string(801, 'a') + "\"}}}",
+       "translations.de.title"},
       {R"({"mode": "swim"})", "mode"},
       {R"({"model": "3dgs"})", "model"},
       {R"({"up": )", "byte 8"},

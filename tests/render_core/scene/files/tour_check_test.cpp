@@ -44,6 +44,34 @@ TEST_F(ToursOnDisk, MediaOfAnySiteNeedHttps) {
               StartsWith("tours[0].stops[0].media[0].src: "));
 }
 
+TEST_F(ToursOnDisk, VoicesAndFilmsMayBeOthersInALanguage) {
+  const auto voice = [&](const std::string& translations) {
+    return mistake(R"(, "narration": {"src": "a.mp3", "translations": )" + translations + "}");
+  };
+  EXPECT_EQ(
+      voice(R"({"de": {"src": "de.ogg", "captions": "de.vtt"}, "fr": {"captions": "f.vtt"}})"), "");
+  const std::string at = "tours[0].stops[0].narration.translations";
+  EXPECT_THAT(voice(R"({"de": {"src": "de.mp4"}})"), StartsWith(at + ".de.src: is no sound"));
+  EXPECT_THAT(voice(R"({"de": {"src": "../a.mp3"}})"), StartsWith(at + ".de.src: "));
+  EXPECT_THAT(voice(R"({"de": {"captions": "a.txt"}})"), StartsWith(at + ".de.captions: "));
+  EXPECT_THAT(voice(R"({"de": {"type": "audio"}})"), StartsWith(at + ".de: "));
+  EXPECT_THAT(voice(R"({"de": {"title": "a"}})"), StartsWith(at + ".de: unknown field"));
+  EXPECT_THAT(voice(R"({"d_e": {}})"), StartsWith(at + ": 'd_e' is no language"));
+  EXPECT_EQ(
+      mistake(R"(, "media": [{"src": "a.mp4", "translations": {"de": {"captions": "a.vtt"}}}])"),
+      "");
+  EXPECT_THAT(
+      mistake(R"(, "media": [{"src": "a.mp4", "translations": {"de": {"captions": "a"}}}])"),
+      StartsWith("tours[0].stops[0].media[0].translations.de.captions: "));
+  const auto sound = [&](const std::string& translations) {
+    return mistake_in(R"({"tours": [{"stops": [], "sound": {"src": "a.mp3", "translations": )" +
+                      translations + "}}]}");
+  };
+  EXPECT_EQ(sound(R"({"de": {"src": "de.ogg"}})"), "");
+  EXPECT_THAT(sound(R"({"de": {"captions": "a.vtt"}})"),
+              StartsWith("tours[0].sound.translations.de: unknown field"));
+}
+
 TEST(MediaName, NamesArePlainPathComponents) {
   for (const char* name : {"a.jpg", "A-b_c.2.webp", "0", "-.png"})
     EXPECT_TRUE(is_media_name(name)) << name;
