@@ -10,7 +10,7 @@ import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
-import { crop_streets, scratch_folder, write_room } from './support/scenes';
+import { crop_streets, scratch_folder } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
@@ -108,65 +108,6 @@ describe('a visitor who walks', () => {
     const stopped = await pose_of(page);
     await page.waitForTimeout(300);
     expect(distance(stopped, await pose_of(page))).toBeLessThan(0.05);
-  });
-});
-
-describe('a visit that begins inside', () => {
-  let inside: RunningServer;
-  beforeAll(async () => {
-    const room = path.join(scratch_folder(), 'room.ply');
-    write_room(room);
-    inside = await start_server(room, ['--min-fps', '0', '--up', '-y']);
-  });
-  const mode = (page: Page): Promise<string> => page.locator('#mode-label').innerText();
-  const drag = async (page: Page, x: number, y: number): Promise<void> => {
-    await page.mouse.move(640, 300);
-    await page.mouse.down();
-    for (let k = 1; k <= 6; ++k) await page.mouse.move(640 + (x * k) / 6, 300 + (y * k) / 6);
-    await page.mouse.up();
-    await settle(page);
-  };
-  const is_inside = ({ position: [x, y, z] }: Pose): boolean =>
-    Math.abs(x) < 4 && y < 0 && y > -2.6 && Math.abs(z) < 3;
-
-  it('turns on the spot, and walks as soon as the floor is known', async () => {
-    const { page, errors } = await open(inside.url, windows.desktop);
-    const begin = await pose_of(page);
-    expect(await mode(page)).not.toBe('Orbit');
-    await drag(page, 120, 0);
-    const turned = await pose_of(page);
-    expect(distance(begin, turned)).toBeLessThan(1e-3);
-    expect(turned.orientation).not.toEqual(begin.orientation);
-    await expect.poll(() => mode(page), { timeout: 60_000 }).toBe('Walk');
-    expect(distance(begin, await pose_of(page))).toBeLessThan(1e-3);
-    await page.keyboard.down('KeyW');
-    await page.waitForTimeout(4000);
-    await page.keyboard.up('KeyW');
-    await settle(page);
-    const walked = await pose_of(page);
-    expect(is_inside(walked)).toBe(true);
-    expect(Math.abs(walked.position[1] - begin.position[1])).toBeLessThan(0.6);
-    await keep_screenshot(page, 'walk-inside');
-    expect(errors).toEqual([]);
-  });
-
-  it('stays inside when it orbits', async () => {
-    const { page } = await open(inside.url, windows.desktop);
-    while ((await mode(page)) !== 'Orbit') await page.keyboard.press('KeyM');
-    for (const [x, y] of [
-      [300, 0],
-      [-500, 40],
-      [200, -150],
-    ] as const) {
-      await drag(page, x, y);
-      expect(is_inside(await pose_of(page))).toBe(true);
-    }
-    await page.keyboard.down('ArrowLeft');
-    await page.waitForTimeout(2000);
-    await page.keyboard.up('ArrowLeft');
-    await settle(page);
-    expect(is_inside(await pose_of(page))).toBe(true);
-    await keep_screenshot(page, 'orbit-inside');
   });
 });
 
