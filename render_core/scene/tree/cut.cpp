@@ -101,7 +101,8 @@ class Walk {
       split = found.facts != nullptr ? std::min(split, found.shown) : 0.0f;
     }
     if (split > 0.0f)
-      for (std::size_t i = count; i-- > 0;) stack_.push_back({children[i], split, errors.typical_px});
+      for (std::size_t i = count; i-- > 0;)
+        stack_.push_back({children[i], split, errors.typical_px});
     return split;
   }
 

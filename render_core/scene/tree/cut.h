@@ -56,7 +56,7 @@ struct CutEye {
   /// A node's error in pixels where its Gaussians are, about: behind the nearest point of its box.
   /// A large box around the camera has little beside it, so that the bound counts it for too much.
   [[nodiscard]] float typical_px(float error, const Cluster& bounds) const {
-    constexpr float behind = 0.25f;  // of the box's half diagonal
+    constexpr float behind = 0.1f;  // of the box's half diagonal
     return error * focal_px / (least_depth(bounds) + behind * glm::length(bounds.half_extent));
   }
 

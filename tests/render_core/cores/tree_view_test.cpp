@@ -138,6 +138,25 @@ TEST_F(TreeViews, ShortMemoryIsCoarser) {
   EXPECT_LE(holes, hidden / 200);
 }
 
+// At any size of a pool, the cut is as coarse as it must be to be whole, and no coarser.
+TEST_F(TreeViews, CutsFitSmallPools) {
+  const TreeScenes scenes;
+  const Rendered all = render_in(*scenes.whole()->make_view({}), tree_request(8.0f, 0.0f));
+  double quality_db = 0.0;
+  float coarsest_px = 1e9f;
+  for (const std::uint32_t slots : {4u, 6u, 10u}) {
+    const auto renderer = scenes.in_pages(pools_of(slots));
+    const Rendered drawn = render_in(*renderer->make_view({}), tree_request(8.0f, 0.0f));
+    EXPECT_EQ(drawn.stats.missing_pages, 0u) << slots << " slots";
+    EXPECT_TRUE(drawn.stats.settled) << slots << " slots";
+    EXPECT_LE(drawn.stats.coarsest_px, coarsest_px) << slots << " slots";
+    EXPECT_GE(renderer->pages().at(0).in_memory + 2, slots) << "memory is used";
+    EXPECT_GT(psnr_db(drawn.rgb, all.rgb), quality_db) << slots << " slots";
+    coarsest_px = drawn.stats.coarsest_px;
+    quality_db = psnr_db(drawn.rgb, all.rgb);
+  }
+}
+
 // Two trees of different pages in a pool that is too small for either. Each draws as in a pool of
 // its own when the other has no View.
 TEST_F(TreeViews, TreesShareAPool) {
