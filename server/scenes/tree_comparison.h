@@ -24,7 +24,7 @@ struct TreeComparison {
 /// Compares pictures of both from where visits begin, in three directions. `whole`: `levels` has
 /// all Gaussians. Otherwise the tree itself shows what is right: it draws small parts of the
 /// pictures, one by one, whose pages fit into the pool. Parts that do not fit do not count; where
-/// none does, both are told as equal. `detail_px`: of the tree. `check` is called often and may
+/// none does, both count as equal. `detail_px`: of the tree. `check` is called often and may
 /// throw to cancel. Throws std::runtime_error if a picture cannot be drawn.
 TreeComparison compare_tree(Renderer& tree, Renderer& levels, bool whole, const SceneFacts& facts,
                             float detail_px, const std::function<void()>& check);
