@@ -69,8 +69,9 @@ struct FrameStats {
   std::uint32_t nodes = 0;  // clusters drawn
   // Levels of these nodes; 0: leaves.
   int finest_level = 0, coarsest_level = 0;
-  std::uint32_t missing_pages = 0;  // wanted but not resident at the pool's last update
-  float coarsest_px = 0.0f;         // the largest error caused by missing pages
+  // Not resident at the pool's last update, though memory has room for them.
+  std::uint32_t missing_pages = 0;
+  float coarsest_px = 0.0f;  // the largest error that memory leaves; 0: none over the detail
   bool settled = true;              // a camera at rest would see no other picture in the next frame
   // Pipeline::paper
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame

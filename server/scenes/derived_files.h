@@ -27,13 +27,14 @@ std::string content_facts(const SceneLocation& scene);
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 
 /// The files in --cache-dir that the server has computed from scenes: trees, and small files:
-/// walkable areas, posters and first views. Files of other names are left alone. Not thread-safe,
+/// walkable areas, posters, first views, and whether a tree is drawn. Files of other names are left alone. Not thread-safe,
 /// but for the small files.
 class DerivedFiles {
  public:
   static constexpr std::size_t most_walkable_areas = 256;
   static constexpr std::size_t most_posters = 10'000;          // about 1 GB
   static constexpr std::size_t most_views = 10'000;            // about 40 MB, a block each
+  static constexpr std::size_t most_choices = 10'000;          // likewise
   static constexpr std::size_t most_small_files_of_scene = 4;  // as authors save it again and again
 
   /// Makes the folder if needed, and removes what builds that were killed and earlier versions have

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "server/config/config.h"
 #include "server/scenes/poster.h"
 #include "server/scenes/scene_entry.h"
+#include "server/scenes/tree_comparison.h"
 
 namespace catgs {
 
@@ -51,8 +53,9 @@ struct UnusableTree : InputError {
 struct LoadedScene {
   std::shared_ptr<const SceneEntry> entry;
   std::string error{};
-  bool unusable_tree = false;  // the error is that of the scene's tree
-  bool gave_way = false;       // no error: a visitor's load came first
+  bool unusable_tree = false;                // the error is that of the scene's tree
+  bool gave_way = false;                     // no error: a visitor's load came first
+  std::optional<TreeComparison> compared{};  // with the representation in memory
 };
 
 /// How that which is computed of a scene is kept for the next load. Empty: it is not.

@@ -40,10 +40,11 @@ const std::string& renderer_text(const SceneIndex& index) {
   return index.records().at(index.preferred()).entry->renderer_text;
 }
 
-WalkableAreaSource source_of(const SceneRecord& record, const SceneTrees& trees) {
+WalkableAreaSource source_of(const SceneRecord& record, const DerivedFiles* files) {
   WalkableAreaSource source = walkable_area_source(record.found.location, record.entry->facts);
   if (source.scene.format == nullptr) return source;  // procedural
-  if (trees.ready(record.found)) source.tree = trees.representation_of(record.found)->tree;
+  const std::string& tree = record.found.tree;
+  if (files && files->contains(tree)) source.tree = files->path_of(tree);
   source.beside = record.entry->sidecar;
   if (!source.beside.empty()) source.beside.replace_extension(".walk");
   return source;
@@ -157,13 +158,13 @@ void SceneLibrary::want_walkable_area(const std::string& id) {
         walkable_areas_.busy())
       return;
     if (record->walkable_area_retry_at && clock_() < *record->walkable_area_retry_at) return;
-    const WalkableAreaSource source = source_of(*record, trees_);
+    const WalkableAreaSource source = source_of(*record, files_.get());
     walkable_areas_.find(
         id, source, [this, id, source, changed = record->found.changed](const auto& walkable_area) {
           SceneRecord* const found_for = index_.find(id);
           if (!found_for || !found_for->entry || found_for->walkable_area ||
               found_for->found.changed != changed ||
-              !same_walkable_area(source, source_of(*found_for, trees_)))
+              !same_walkable_area(source, source_of(*found_for, files_.get())))
             return;
           found_for->walkable_area = walkable_area;
           if (!walkable_area) found_for->walkable_area_retry_at = clock_() + seek_again_after;
@@ -178,9 +179,9 @@ void SceneLibrary::revise(const std::string& id, std::shared_ptr<const SceneEntr
   if (record->former && record->former->renderer == entry->renderer)
     entry = redrawn(*entry, *record->entry);
   if (record->entry->renderer != entry->renderer) return;
-  const WalkableAreaSource before = source_of(*record, trees_);
+  const WalkableAreaSource before = source_of(*record, files_.get());
   record->entry = unleased(std::move(entry), record->entry->renderer);
-  if (!record->outdated && !same_walkable_area(before, source_of(*record, trees_)))
+  if (!record->outdated && !same_walkable_area(before, source_of(*record, files_.get())))
     record->walkable_area.reset();
   memory_.publish();
 }

@@ -56,13 +56,17 @@ std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found)
   return load_as(trees_.representation_of(found).value_or(SceneRepresentation()));
 }
 
-void SceneLoader::load(const FoundScene& found, const SceneRepresentation& representation, For whom,
-                       std::function<void(LoadedScene)> then) {
+void SceneLoader::load_beside(Present present, const FoundScene& found,
+                              const SceneRepresentation& representation, For whom,
+                              std::function<void(LoadedScene)> then) {
   const bool waits = whom == For::visitors;
   const auto id = jobs_.start_then(
       lanes.scenes, waits ? Priority::high : Priority::normal,
-      [this, found, representation](const auto& stop) {
-        return load_on(found, representation, stop);
+      [this, found, representation, present = std::move(present)](const auto& stop) {
+        LoadedScene loaded = load_on(found, representation, stop);
+        if (loaded.entry && present.renderer)
+          loaded.compared = compared(*loaded.entry, present, stop);
+        return loaded;
       },
       [then = std::move(then)](Finished<LoadedScene> loaded) {
         then(loaded.result ? *std::move(loaded.result)
@@ -84,6 +88,14 @@ LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneRepresentat
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }
+}
+
+TreeComparison SceneLoader::compared(const SceneEntry& entry, const Present& present,
+                                     const std::stop_token& stop) const {
+  Renderer &tree = entry.in_pages ? *entry.renderer : *present.renderer,
+           &other = entry.in_pages ? *present.renderer : *entry.renderer;
+  return compare_tree(tree, other, entry.in_pages && present.whole, entry.facts,
+                      static_cast<float>(config_.detail_px), [&] { throw_if_stopped(stop); });
 }
 
 void SceneLoader::read_poster(const FoundScene& found, const SceneRepresentation& representation,

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render_core/frame/renderer.h"
@@ -36,7 +37,18 @@ class SceneLoader {
   /// Loads it in the background and calls `then`. Visitors' loads come first.
   enum class For { visitors, jobs };
   void load(const FoundScene& found, const SceneRepresentation& representation, For whom,
-            std::function<void(LoadedScene)> then);
+            std::function<void(LoadedScene)> then) {
+    load_beside({}, found, representation, whom, std::move(then));
+  }
+  /// A representation in memory.
+  struct Present {
+    std::shared_ptr<Renderer> renderer;  // null: none
+    bool whole = false;                  // it has all Gaussians and is no tree
+  };
+  /// Compares the new representation with the present one, too.
+  void load_beside(Present present, const FoundScene& found,
+                   const SceneRepresentation& representation, For whom,
+                   std::function<void(LoadedScene)> then);
   /// Ends a load that no visitor waits for.
   void give_way() { jobs_.cancel(gives_way_); }
   /// Frees a scene in the background, because that may wait for the device.
@@ -51,6 +63,8 @@ class SceneLoader {
                                     const std::stop_token& stop) const;
   [[nodiscard]] KeepDerived keep(const FoundScene& found,
                                  const SceneRepresentation& representation) const;
+  [[nodiscard]] TreeComparison compared(const SceneEntry& entry, const Present& present,
+                                        const std::stop_token& stop) const;
 
   const ServerConfig& config_;
   RendererOptions core_;  // fixed once the first scenes are loaded

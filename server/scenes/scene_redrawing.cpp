@@ -47,7 +47,11 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
     }
     const bool wants_tree = record.entry->in_pages
                                 ? record.tree_lost
-                                : record.entry->coarse || trees_.deserves_one(found);
+                                : (record.entry->coarse || trees_.deserves_one(found)) &&
+                                      trees_.choices().of(found) != TreeChoices::Choice::without;
+    if (!wants_tree && record.entry->in_pages && trees_.undecided(found) &&
+        residency_.has_room(trees_.bytes_of(found)))
+      start(id);
     if (!wants_tree || trees_.given_up(found)) continue;
     if (!trees_.ready(found))
       trees_.order(found, false);
@@ -65,10 +69,18 @@ void SceneRedrawing::start(const std::string& id) {
   if (busy_ || residency_.busy()) return;
   busy_ = true;
   const SceneRecord& record = *index_.find(id);
-  residency_.resize(id, need_of(*record.entry).with(trees_.need_of(record.found)));
-  loader_.load(record.found, *trees_.representation_of(record.found), SceneLoader::For::visitors,
-               [this, id, found = record.found, before = record.entry->renderer](
-                   LoadedScene loaded) { on_loaded(id, found, std::move(loaded), before); });
+  const SceneEntry& before = *record.entry;
+  const bool to_tree = !before.in_pages || record.tree_lost;
+  residency_.resize(id, need_of(before).with(to_tree ? trees_.need_of(record.found)
+                                                     : SceneNeed(trees_.bytes_of(record.found))));
+  SceneLoader::Present present;
+  if (!record.tree_lost) present = {before.renderer, !before.in_pages && !before.coarse};
+  loader_.load_beside(
+      std::move(present), record.found, *trees_.representation_of(record.found, to_tree),
+      SceneLoader::For::visitors,
+      [this, id, found = record.found, renderer = before.renderer](LoadedScene loaded) {
+        on_loaded(id, found, std::move(loaded), renderer);
+      });
 }
 
 void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, LoadedScene loaded,
@@ -77,6 +89,8 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   SceneRecord* const record = index_.find(id);
   if (record && record->entry) residency_.resize(id, need_of(*record->entry));
   if (loaded.unusable_tree) return trees_.discard(found, loaded.error);
+  if (!loaded.entry && record && record->entry && record->entry->in_pages && !record->tree_lost)
+    return trees_.choices().decide(found, {});  // its levels do not fit
   if (!loaded.entry) return trees_.give_up(found, loaded.error);
   const bool still_wanted = record && record->entry && record->entry->renderer == before &&
                             record->found.tree == found.tree && !record->outdated;
@@ -84,13 +98,16 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   // Visitors' places are about the origin that their welcome named.
   if (loaded.entry->facts.origin != record->entry->facts.origin)
     return trees_.give_up(found, "it has another origin than the scene in memory");
+  if (loaded.compared) trees_.choices().decide(found, *loaded.compared);
+  if (loaded.compared && loaded.compared->tree_is_good() != loaded.entry->in_pages)
+    return loader_.free_later(std::move(loaded.entry));
   residency_.resize(id, need_of(*record->entry).with(need_of(*loaded.entry)));
   record->former = std::exchange(record->entry, redrawn(*record->entry, *loaded.entry));
   record->tree_lost = false;
   record->recall();  // jobs continue with the new representation
   changed_ = true;
-  log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its tree from now on",
-           id);
+  log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its {} from now on", id,
+           record->entry->in_pages ? "tree" : "levels");
 }
 
 }  // namespace catgs

@@ -40,6 +40,7 @@ SceneTrees::SceneTrees(const ServerConfig& config, DerivedFiles* cache, int thre
       clock_(std::move(clock)),
       could_fit_(std::move(could_fit)),
       cache_(cache),
+      choices_(cache, config_),
       jobs_(background, io) {}
 
 bool SceneTrees::ready(const FoundScene& scene) const {
@@ -54,9 +55,20 @@ bool SceneTrees::needs_one(const FoundScene& scene) const {
   return !scene.tree.empty() && !could_fit_(scene.size.bytes());
 }
 
-std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScene& scene) const {
+bool SceneTrees::is_drawn_from_tree(const FoundScene& scene) const {
+  const bool has_other = scene.location.has_levels() || !needs_one(scene);
+  return ready(scene) && !(has_other && choices_.of(scene) == TreeChoices::Choice::without);
+}
+
+bool SceneTrees::undecided(const FoundScene& scene) const {
+  return needs_one(scene) && scene.location.has_levels() &&
+         choices_.of(scene) == TreeChoices::Choice::unknown;
+}
+
+std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScene& scene,
+                                                                 bool from_tree) const {
   SceneRepresentation representation;
-  if (ready(scene)) {
+  if (from_tree && is_drawn_from_tree(scene)) {
     representation.tree = cache_->path_of(scene.tree);
   } else if (needs_one(scene)) {
     if (!scene.location.has_levels()) return std::nullopt;
@@ -66,19 +78,15 @@ std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScen
   return representation;
 }
 
-SceneSize SceneTrees::size_of(const FoundScene& scene) const {
-  SceneSize size = scene.size;
-  size.in_pages |= ready(scene) || needs_one(scene);
-  return size;
-}
-
 std::uint64_t SceneTrees::bytes_of(const FoundScene& scene) const {
-  return most_bytes(size_of(scene), config_);
+  SceneSize size = scene.size;
+  size.in_pages |= is_drawn_from_tree(scene) || needs_one(scene);
+  return most_bytes(size, config_);
 }
 
 SceneNeed SceneTrees::need_of(const FoundScene& scene) const {
-  // Until its tree is there, a scene that needs one is in memory as a whole, on a coarser level.
-  return {bytes_of(scene), scene.size.in_pages || ready(scene)};
+  // Without its tree, a scene that needs one is in memory as a whole, on a coarser level.
+  return {bytes_of(scene), scene.size.in_pages || is_drawn_from_tree(scene)};
 }
 
 void SceneTrees::order(const FoundScene& scene, bool urgent) {
@@ -218,6 +226,7 @@ void SceneTrees::keep(const std::set<std::string>& names) {
     jobs_.cancel(of.second->job);
     return true;
   });
+  choices_.keep(names);
   std::erase_if(given_up_, [&](const auto& of) { return !names.contains(of.first); });
   std::erase_if(discarded_, [&](const auto& of) { return !names.contains(of.first); });
   cache_->keep(names);

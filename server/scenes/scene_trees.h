@@ -19,6 +19,7 @@
 #include "server/scenes/scene_catalog.h"
 #include "server/scenes/scene_folder.h"
 #include "server/scenes/scene_residency.h"
+#include "server/scenes/tree_choices.h"
 
 namespace catgs {
 
@@ -37,9 +38,14 @@ class SceneTrees {
   [[nodiscard]] bool ready(const FoundScene& scene) const;
   /// True if a scene that fits into memory is still better drawn from a tree.
   [[nodiscard]] bool deserves_one(const FoundScene& scene) const;
+  /// What of the two looks better.
+  [[nodiscard]] TreeChoices& choices() { return choices_; }
+  /// True if a scene in pages may look better in its own levels.
+  [[nodiscard]] bool undecided(const FoundScene& scene) const;
   /// The representation in which the scene can be loaded now; nothing: its tree has to be built
-  /// first.
-  [[nodiscard]] std::optional<SceneRepresentation> representation_of(const FoundScene& scene) const;
+  /// first. `from_tree`: from a tree if that is there and suits it.
+  [[nodiscard]] std::optional<SceneRepresentation> representation_of(const FoundScene& scene,
+                                                                     bool from_tree = true) const;
   /// The most memory that the scene takes on each device in that representation, or as a tree,
   /// bytes.
   [[nodiscard]] std::uint64_t bytes_of(const FoundScene& scene) const;
@@ -83,8 +89,8 @@ class SceneTrees {
   [[nodiscard]] SharedBuild running() const;
   /// True if the scene can be in memory as a tree alone.
   [[nodiscard]] bool needs_one(const FoundScene& scene) const;
-  /// The size of the scene in the representation that it has or will have.
-  [[nodiscard]] SceneSize size_of(const FoundScene& scene) const;
+  /// True if its tree is there and suits it.
+  [[nodiscard]] bool is_drawn_from_tree(const FoundScene& scene) const;
   /// Builds on this thread. Throws InputError.
   void build(const FoundScene& scene, const std::function<void(double)>& progress) const;
   void on_built(const SharedBuild& build, const Finished<Clock::duration>& built);
@@ -95,6 +101,7 @@ class SceneTrees {
   const std::function<TimePoint()> clock_;
   const std::function<bool(std::uint64_t bytes)> could_fit_;
   DerivedFiles* const cache_;
+  TreeChoices choices_;
   std::map<std::string, SharedBuild> builds_;   // ordered, by the tree's name
   int told_percent_ = 0;                        // of the build under way
   bool changed_ = false;                        // a state_of(), since the last tick

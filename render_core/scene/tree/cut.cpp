@@ -18,13 +18,21 @@ struct Eye {
   CutEye eye;
 };
 
-/// Largest error of a node in pixels over the cameras that may see it; negative: none does.
-float visible_error_px(std::span<const Eye> eyes, const NodeFacts& facts) {
-  if (eyes.empty()) return unbounded_px;
-  float largest = -1.0f;
-  for (const Eye& eye : eyes)
-    if (!eye.culler.outside(facts.bounds))
-      largest = std::max(largest, eye.eye.error_px(facts.error, facts.bounds));
+/// A node's errors, as PageUse has them.
+struct Errors {
+  float px = -1.0f, typical_px = -1.0f;
+};
+
+/// The largest errors of a node over the cameras that may see it; negative: none does.
+Errors visible_errors(std::span<const Eye> eyes, const NodeFacts& facts) {
+  if (eyes.empty()) return {unbounded_px, unbounded_px};
+  Errors largest;
+  for (const Eye& eye : eyes) {
+    if (eye.culler.outside(facts.bounds)) continue;
+    largest.px = std::max(largest.px, eye.eye.error_px(facts.error, facts.bounds));
+    largest.typical_px =
+        std::max(largest.typical_px, eye.eye.typical_px(facts.error, facts.bounds));
+  }
   return largest;
 }
 
@@ -32,6 +40,7 @@ float visible_error_px(std::span<const Eye> eyes, const NodeFacts& facts) {
 struct Step {
   NodeId node;
   float taken = 1.0f;
+  float most_px = unbounded_px;  // the typical error of the node above
 };
 
 class Walk {
@@ -43,7 +52,7 @@ class Walk {
   Cut run() {
     const std::uint64_t first = shape_.page_of(shape_.root());
     if (page_at(first).facts == nullptr) {
-      cut_.missing.push_back({first, unbounded_px});
+      cut_.missing.push_back({first, unbounded_px, unbounded_px});
       return std::move(cut_);
     }
     stack_.push_back({shape_.root()});
@@ -68,15 +77,16 @@ class Walk {
 
   void visit(const Step& step) {
     const NodeFacts* facts = page_at(shape_.page_of(step.node)).facts;
-    const float error = visible_error_px(eyes_, facts[shape_.slot_of(step.node)]);
-    if (error < 0.0f) return;
-    const float split = step.node.level == 0 ? 0.0f : split_into_children(step, error);
+    Errors errors = visible_errors(eyes_, facts[shape_.slot_of(step.node)]);
+    if (errors.px < 0.0f) return;
+    errors.typical_px = std::min(errors.typical_px, step.most_px);
+    const float split = step.node.level == 0 ? 0.0f : split_into_children(step, errors);
     if (split < step.taken) cut_.drawn.push_back({step.node, step.taken - split});
   }
 
   /// The part of a node that its children take over. They are visited next.
-  float split_into_children(const Step& step, float error) {
-    float split = std::min(step.taken, split_share(error, detail_px_));
+  float split_into_children(const Step& step, const Errors& errors) {
+    float split = std::min(step.taken, split_share(errors.px, detail_px_));
     if (split <= 0.0f) return 0.0f;
     const auto below = static_cast<std::uint8_t>(step.node.level - 1);
     const NodeId children[2] = {{below, 2 * step.node.index}, {below, 2 * step.node.index + 1}};
@@ -86,11 +96,13 @@ class Walk {
       const std::uint64_t its_page = shape_.page_of(child);
       if (its_page == page) continue;
       const PageInMemory found = find_(its_page);
-      (found.facts != nullptr ? cut_.used : cut_.missing).push_back({its_page, error});
+      (found.facts != nullptr ? cut_.used : cut_.missing)
+          .push_back({its_page, errors.typical_px, errors.px});
       split = found.facts != nullptr ? std::min(split, found.shown) : 0.0f;
     }
     if (split > 0.0f)
-      for (std::size_t i = count; i-- > 0;) stack_.push_back({children[i], split});
+      for (std::size_t i = count; i-- > 0;)
+        stack_.push_back({children[i], split, errors.typical_px});
     return split;
   }
 

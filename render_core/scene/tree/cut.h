@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "render_core/base/host_device.h"
 #include "render_core/math/camera.h"
@@ -31,10 +32,9 @@ struct CutEye {
     least_cosine = 1.0f / std::sqrt(1.0f + slope.x * slope.x + slope.y * slope.y);
   }
 
-  /// An upper bound of a node's error in pixels: error x focal / the least depth of a point of its
-  /// box in view. That is no less than the near plane's, than the depth of the box, and than its
-  /// distance times the cosine of the widest angle in view. The bound grows towards the root.
-  [[nodiscard]] CATGS_HD float error_px(float error, const Cluster& bounds) const {
+  /// A lower bound of the depths of a box's points in view: the near plane's, the depth of the box,
+  /// and its distance times the cosine of the widest angle in view.
+  [[nodiscard]] CATGS_HD float least_depth(const Cluster& bounds) const {
     const float x = bounds.centre.x - position.x, y = bounds.centre.y - position.y,
                 z = bounds.centre.z - position.z;
     const float depth =
@@ -45,7 +45,19 @@ struct CutEye {
                 out_y = fmaxf(fabsf(y) - bounds.half_extent.y, 0.0f),
                 out_z = fmaxf(fabsf(z) - bounds.half_extent.z, 0.0f);
     const float distance = sqrtf(out_x * out_x + out_y * out_y + out_z * out_z);
-    return error * focal_px / fmaxf(fmaxf(depth, least_cosine * distance), near_z);
+    return fmaxf(fmaxf(depth, least_cosine * distance), near_z);
+  }
+
+  /// An upper bound of a node's error in pixels. It grows towards the root.
+  [[nodiscard]] CATGS_HD float error_px(float error, const Cluster& bounds) const {
+    return error * focal_px / least_depth(bounds);
+  }
+
+  /// A node's error in pixels where its Gaussians are, about: behind the nearest point of its box.
+  /// A large box around the camera has little beside it, so that the bound counts it for too much.
+  [[nodiscard]] float typical_px(float error, const Cluster& bounds) const {
+    constexpr float behind = 0.1f;  // of the box's half diagonal
+    return error * focal_px / (least_depth(bounds) + behind * glm::length(bounds.half_extent));
   }
 
   glm::vec3 position, forward;  // world; the view axis, unit
@@ -82,7 +94,8 @@ struct DrawnNode {
 /// A page, and the error of the node that it refines, as the cut's cameras see it.
 struct PageUse {
   std::uint64_t page = 0;
-  float error_px = 0.0f;
+  float typical_px = 0.0f;  // no more than that of the nodes above; memory goes by it
+  float error_px = 0.0f;    // the bound
 };
 
 struct Cut {

@@ -54,14 +54,14 @@ void PageChoice::note(std::uint32_t tree, const Cut& cut) {
     if (found == families_.end()) continue;
     Family& family = found->second;
     const bool first = family.wanted_at_s != now_s_;
-    family.error_px = first ? use.error_px : std::max(family.error_px, use.error_px);
+    family.error_px = first ? use.typical_px : std::max(family.error_px, use.typical_px);
     family.wanted_at_s = now_s_;
   }
   for (const PageUse& use : cut.missing) {
     const PageOfTree first = family_of({tree, use.page});
     if (families_.contains(first)) continue;
     float& error = wanted_[first];
-    error = std::max(error, use.error_px);
+    error = std::max(error, use.typical_px);
   }
 }
 
@@ -88,7 +88,10 @@ PageChoice::Step PageChoice::next(std::uint32_t free_slots, std::uint32_t most) 
     if (up && !families_.contains(*up)) continue;
     step.cut_short = !within(step.awaited) || (room <= 0 && !within(step.drop));
     if (step.cut_short) break;
-    if (room <= 0 && !drop(clearly_less * wanted.error_px)) break;
+    if (room <= 0 && !drop(clearly_less * wanted.error_px)) {
+      step.budget_px = wanted.error_px;
+      break;
+    }
     if (up && !families_.contains(*up)) continue;  // it was dropped: a forged file
     --room;
     if (step.awaited.empty() && within(step.load) &&

@@ -24,8 +24,8 @@ struct PageOfTree {
 
 /// Decides which pages of several trees are in memory, for all that look at them. Pages come and go
 /// by family: the one or two pages that refine one node. A family is there only with the page above
-/// it; the page of a tree's root stays. The largest errors on screen win, whichever tree they are
-/// of. Pure: time comes in, decisions come out.
+/// it; the page of a tree's root stays. The largest typical errors on screen win, whichever tree
+/// they are of. Pure: time comes in, decisions come out.
 ///
 /// A family counts for two slots even where it has one page. So any family fits where another was,
 /// and while nobody's wishes change, none that went comes back.
@@ -52,6 +52,7 @@ class PageChoice {
     std::vector<PageOfTree> drop;     // whole families
     std::vector<PageOfTree> awaited;  // whole families to be loaded when more slots are free
     bool cut_short = false;           // more would have changed without the bound
+    float budget_px = 0.0f;  // no family up to this error finds room: cuts are as coarse as that
   };
   /// `free_slots`: those that may be written now. Fewer than there should be are free while frames
   /// still need pages that were dropped. At most `most` pages are loaded, and as many dropped.

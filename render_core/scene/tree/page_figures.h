@@ -10,7 +10,7 @@ struct PageFigures {
   std::optional<int> device{};  // nothing: in main memory
   // The scene's.
   std::uint32_t in_memory = 0;   // pages now
-  std::uint32_t missing = 0;     // wanted by its Views at the pool's last update
+  std::uint32_t missing = 0;     // wanted at the pool's last update, and there is room for them
   std::uint64_t loaded = 0;      // pages since the scene came into memory
   std::uint64_t unreadable = 0;  // pages that were asked for and are damaged
   // The pool's.

@@ -113,6 +113,7 @@ bool PagePool::look_and_change() {
   for (const PageOfTree& of : step.awaited) changes[of.tree].awaited.push_back(of.page);
   for (const auto& [number, tree] : trees_) {
     changes[number].more = step.cut_short;
+    changes[number].budget_px = step.budget_px;
     for (const std::uint64_t page : tree->change(changes[number], readers_))
       choice_.failed({number, page});
   }

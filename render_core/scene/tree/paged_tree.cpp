@@ -115,7 +115,7 @@ std::vector<std::uint64_t> PagedTree::change(const PageChanges& changes, ThreadP
                                [&](const PageUse& use) { return changing.contains(use.page); });
   };
   for (const Seen& seen : seen_)
-    seen.watch->turned(seen.number, seen.cut,
+    seen.watch->turned(seen.number, seen.cut, changes.budget_px,
                        (changes.more && !seen.cut.missing.empty()) ||
                            changes_any(seen.cut.missing) || changes_any(seen.cut.used),
                        now_s());

@@ -43,6 +43,7 @@ std::uint32_t slots_in(std::uint64_t memory_bytes, std::size_t slot_bytes, const
 struct PageChanges {
   std::vector<std::uint64_t> load, drop, awaited;
   bool more = false;  // the step was cut short
+  float budget_px = 0.0f;
 };
 
 /// A tree and those of its pages that a pool holds.

@@ -33,10 +33,12 @@ Watch::Numbered Watch::demand() const {
   return {demand_, number_};
 }
 
-void Watch::turned(std::uint64_t number, const Cut& cut, bool changes, double now_s) {
+void Watch::turned(std::uint64_t number, const Cut& cut, float budget_px, bool changes,
+                   double now_s) {
   const std::lock_guard lock(mutex_);
   turned_ = number;
-  progress_.missing = static_cast<std::uint32_t>(cut.missing.size());
+  progress_.missing = static_cast<std::uint32_t>(std::ranges::count_if(
+      cut.missing, [=](const PageUse& use) { return use.typical_px > budget_px; }));
   progress_.coarsest_px = cut.missing.empty() ? 0.0f : cut.missing.front().error_px;
   changing_ = changes;
   if (!changes) return;

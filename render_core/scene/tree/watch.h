@@ -37,15 +37,16 @@ class Watch {
   };
   [[nodiscard]] Numbered demand() const;
   /// A turn of the pool has looked at the demand with this number. `cut`: as it was before the
-  /// turn. `changes`: pages of the cut came or went in the turn, or will in the next ones.
-  void turned(std::uint64_t number, const Cut& cut, bool changes, double now_s);
+  /// turn. `budget_px`: no page up to this typical error finds room, so the View does without.
+  /// `changes`: pages of the cut came or went in the turn, or will in the next ones.
+  void turned(std::uint64_t number, const Cut& cut, float budget_px, bool changes, double now_s);
   /// Whether the next frame for the same demand may look better than one at `now_s`, in the pool's
   /// time: pages are still being read or blended in.
   [[nodiscard]] bool waits(double now_s) const;
   struct Progress {
     std::uint64_t changes = 0;  // turns that began or continued a change of its cuts
-    std::uint32_t missing = 0;  // pages that were wanted but not resident at the last turn
-    float coarsest_px = 0.0f;   // the largest error that missing pages cause
+    std::uint32_t missing = 0;  // pages within the budget that were not resident at the last turn
+    float coarsest_px = 0.0f;   // the largest error over the wanted detail: memory has no finer one
   };
   [[nodiscard]] Progress progress() const;
 

@@ -25,7 +25,7 @@ struct PageUsage {
   double nodes_mean = 0.0;
   double missing_mean = 0.0;  // pages
   std::uint32_t missing_max = 0;
-  float coarsest_px = 0.0f;  // the largest error caused by missing pages
+  float coarsest_px = 0.0f;  // the largest error that memory leaves
 };
 
 /// One pass over the path, or several: frames back to back, none skipped. The queries below are

@@ -120,7 +120,7 @@ TEST_F(TreeViews, ShortMemoryIsCoarser) {
   FrameRequest request = tree_request(8.0f, 0.0f);
   const Rendered coarse = render_in(*view, request);
   const Rendered all = render_in(*scenes.whole()->make_view({}), request);
-  EXPECT_GT(coarse.stats.missing_pages, 0u);
+  EXPECT_EQ(coarse.stats.missing_pages, 0u) << "none has room";
   EXPECT_GT(coarse.stats.coarsest_px, 0.0f);
   EXPECT_GT(coarse.stats.coarsest_level, 0);
   EXPECT_LE(coarse.stats.finest_level, coarse.stats.coarsest_level);
@@ -136,6 +136,25 @@ TEST_F(TreeViews, ShortMemoryIsCoarser) {
   }
   EXPECT_GT(hidden, all.rgb.size() / 20);
   EXPECT_LE(holes, hidden / 200);
+}
+
+// At any size of a pool, the cut is as coarse as it must be to be whole, and no coarser.
+TEST_F(TreeViews, CutsFitSmallPools) {
+  const TreeScenes scenes;
+  const Rendered all = render_in(*scenes.whole()->make_view({}), tree_request(8.0f, 0.0f));
+  double quality_db = 0.0;
+  float coarsest_px = 1e9f;
+  for (const std::uint32_t slots : {4u, 6u, 10u}) {
+    const auto renderer = scenes.in_pages(pools_of(slots));
+    const Rendered drawn = render_in(*renderer->make_view({}), tree_request(8.0f, 0.0f));
+    EXPECT_EQ(drawn.stats.missing_pages, 0u) << slots << " slots";
+    EXPECT_TRUE(drawn.stats.settled) << slots << " slots";
+    EXPECT_LE(drawn.stats.coarsest_px, coarsest_px) << slots << " slots";
+    EXPECT_GE(renderer->pages().at(0).in_memory + 2, slots) << "memory is used";
+    EXPECT_GT(psnr_db(drawn.rgb, all.rgb), quality_db) << slots << " slots";
+    coarsest_px = drawn.stats.coarsest_px;
+    quality_db = psnr_db(drawn.rgb, all.rgb);
+  }
 }
 
 // Two trees of different pages in a pool that is too small for either. Each draws as in a pool of
@@ -155,7 +174,7 @@ TEST_F(TreeViews, TreesShareAPool) {
     return render_in(*own->make_view({}), request);
   };
   const Rendered low_alone = alone(low), high_alone = alone(high);
-  EXPECT_GT(low_alone.stats.missing_pages, 0u);
+  EXPECT_GT(low_alone.stats.coarsest_px, 0.0f);
   {
     const auto second = high.in_pages(pools);
     const auto expect_same = [&](Renderer& renderer, const Rendered& expected) {
@@ -192,7 +211,8 @@ TEST_F(TreeViews, AViewAtRestSettles) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   EXPECT_TRUE(drawn.stats.settled);
-  EXPECT_GT(drawn.stats.missing_pages, 0u);
+  EXPECT_EQ(drawn.stats.missing_pages, 0u) << "the cut fits the pool";
+  EXPECT_GT(drawn.stats.coarsest_px, 0.0f);
   const PageFigures figures = renderer->pages().at(0);
   EXPECT_EQ(figures.loaded, figures.in_memory) << "what was read is there";
   for (int frame = 0; frame < 10; ++frame) EXPECT_TRUE(render_in(*view, request).stats.settled);

@@ -44,7 +44,7 @@ export interface PagesDrawn {
   readonly nodes: number;
   readonly missing_pages: number;
   readonly detail_px: number; // largest error drawn on purpose
-  readonly coarsest_px: number; // largest error caused by missing pages
+  readonly coarsest_px: number; // largest error that memory leaves
   // Levels of the tree that are drawn; 0: every Gaussian.
   readonly finest_level: number;
   readonly coarsest_level: number;
