@@ -66,7 +66,7 @@ void add_client_options(CLI::App& app, GroupOptions& group) {
   add_duration(app, "--leave-every", manners.leave_every_s,
                "Leave as a closed page does; another visitor comes at once, again and again");
   add_duration(app, "--lose-decoder-every", manners.lose_decoder_every_s,
-               "Lose the decoder as with the GPU, and go on from an IDR, again and again")
+               "Lose the decoder as with the GPU, and continue from an IDR, again and again")
       ->needs(decode);
   add_duration(app, "--stall-at", manners.stall_at_s, "Neither read nor write from here on, …");
   add_duration(app, "--stall-for", manners.stall_for_s, "… for this long");
