@@ -72,7 +72,7 @@ struct FrameStats {
   // Not resident at the pool's last update, though memory has room for them.
   std::uint32_t missing_pages = 0;
   float coarsest_px = 0.0f;  // the largest error that memory leaves; 0: none over the detail
-  bool settled = true;              // a camera at rest would see no other picture in the next frame
+  bool settled = true;       // a camera at rest would see no other picture in the next frame
   // Pipeline::paper
   int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()

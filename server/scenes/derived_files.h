@@ -27,8 +27,8 @@ std::string content_facts(const SceneLocation& scene);
 std::string tree_name(const SceneLocation& scene, const LoadOptions& levels);
 
 /// The files in --cache-dir that the server has computed from scenes: trees, and small files:
-/// walkable areas, posters, first views, and whether a tree is drawn. Files of other names are left alone. Not thread-safe,
-/// but for the small files.
+/// walkable areas, posters, first views, and whether a tree is drawn. Files of other names are left
+/// alone. Not thread-safe, but for the small files.
 class DerivedFiles {
  public:
   static constexpr std::size_t most_walkable_areas = 256;

@@ -11,6 +11,17 @@
 
 namespace catgs::load {
 
+namespace {
+
+/// Poses are numbered on, since the statistics find them by their numbers.
+SessionState next_visitor(const SessionState& before) {
+  SessionState state;
+  state.next_pose_id = before.next_pose_id;
+  return state;
+}
+
+}  // namespace
+
 boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContext context,
                                          SessionReport& report) {
   constexpr std::chrono::milliseconds first_pause{250}, longest_pause{4000};
@@ -23,7 +34,7 @@ boost::asio::awaitable<void> run_session(SessionSettings settings, SessionContex
     Connection connection(settings, context, state, report, executor);
     const Connection::End end = co_await connection.run();
     if (end == Connection::End::left) {  // the next visitor knows nothing of this one's session
-      state = {.next_pose_id = state.next_pose_id};  // by which the statistics find a pose
+      state = next_visitor(state);
       ++report.stats.counts.leaves;
       continue;
     }
