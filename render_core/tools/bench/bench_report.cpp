@@ -177,9 +177,10 @@ void print_quality(const QualityReport& quality, bool groups) {
 
 void print_pages(const Measurement& measurement, float detail_px) {
   const PageUsage pages = measurement.pages();
-  fmt::print("{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail",
-             detail_px, pages.nodes_mean, pages.missing_mean, pages.missing_max,
-             pages.missing_max > 0 ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
+  fmt::print(
+      "{:<14}{} px: {:.0f} nodes drawn; {:.1f} pages missing, {} at most{}\n", "detail", detail_px,
+      pages.nodes_mean, pages.missing_mean, pages.missing_max,
+      pages.coarsest_px > 0.0f ? fmt::format("; coarsest {:.3g} px", pages.coarsest_px) : "");
   const Summary sharp = summarize(measurement.sharp_ms);
   fmt::print("{:<14}{:.0f} ms after a jump to a new place, {:.0f} ms at most\n", "sharp",
              sharp.mean, sharp.max);

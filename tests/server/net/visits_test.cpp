@@ -66,9 +66,9 @@ TEST_F(Visits, AreSentAsFarAsTheyAreRead) {
 TEST_F(Visits, ThePageComesFromTheClientAndHasAPolicyOfItsOwn) {
   const TemporaryFolder client;
   const auto page_of = [&] {
-    const RunningServer server(
+    const RunningServer with_client(
         [&](ServerConfig& config) { config.client_dir = client.path().string(); });
-    return http_get(server.admin_port(), "/visits?days=7");
+    return http_get(with_client.admin_port(), "/visits?days=7");
   };
   client.write("index.html", "<p>the client</p>");
   EXPECT_EQ(page_of().status, 404);
