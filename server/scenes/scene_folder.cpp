@@ -37,15 +37,21 @@ SceneAbout about_in(const fs::path& sidecar) {
   return {};
 }
 
-/// The newest file counts, because the files of a folder may be replaced one by one or all at once.
-fs::file_time_type time_of(const fs::path& path, const std::vector<fs::path>& beside) {
+/// The files of a folder may be replaced one by one or all at once.
+FilesStamp stamp_of(const fs::path& path, const std::vector<fs::path>& beside) {
+  FilesStamp stamp{.newest = fs::file_time_type::min()};
+  const auto add = [&](const fs::path& file) {
+    std::error_code error;
+    stamp.newest = std::max(stamp.newest, fs::last_write_time(file, error));
+    const std::uintmax_t bytes = fs::is_regular_file(file, error) ? fs::file_size(file, error) : 0;
+    if (!error) stamp.bytes += bytes;
+  };
+  add(path);
   std::error_code error;
-  auto newest = fs::last_write_time(path, error);
   if (fs::is_directory(path, error))
-    for (const auto& entry : fs::directory_iterator(path, error))
-      newest = std::max(newest, fs::last_write_time(entry.path(), error));
-  for (const fs::path& file : beside) newest = std::max(newest, fs::last_write_time(file, error));
-  return newest;
+    for (const auto& entry : fs::directory_iterator(path, error)) add(entry.path());
+  for (const fs::path& file : beside) add(file);
+  return stamp;
 }
 
 }  // namespace
@@ -97,14 +103,14 @@ std::vector<FoundScene> SceneFolders::scan() {
   for (const fs::path& path : paths) {
     const auto before = known_.find(path);
     Known& now = known[path];
-    if (before != known_.end() && before->second.changed == time_of(path, before->second.beside)) {
+    if (before != known_.end() && before->second.stamp == stamp_of(path, before->second.beside)) {
       now = std::move(before->second);
     } else {
       now.beside = files_beside(path);
-      now.changed = time_of(path, now.beside);
+      now.stamp = stamp_of(path, now.beside);
       try {
         now.scene = read_scene_headers(locate_scene(path), scan_options_);
-        now.scene.changed = now.changed;
+        now.scene.stamp = now.stamp;
         now.good = true;
       } catch (
           const std::exception& error) {  // it may be half copied: its next change is read again

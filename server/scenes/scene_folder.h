@@ -13,6 +13,14 @@
 
 namespace catgs {
 
+/// By which a scan sees that the files of a scene have changed. Times alone do not tell it: copies
+/// may keep the times of their originals.
+struct FilesStamp {
+  std::filesystem::file_time_type newest;
+  std::uintmax_t bytes = 0;  // of all files
+  bool operator==(const FilesStamp&) const = default;
+};
+
 /// A scene as described by its headers.
 struct FoundScene {
   SceneLocation location;
@@ -20,9 +28,9 @@ struct FoundScene {
   std::string id;
   SceneSize size;
   SceneAbout about;  // of its sidecar, when the scene was found
-  /// Modification time of the file, or of the newest one that it has beside it or directly in its
-  /// folder. A new value means a new scene.
-  std::filesystem::file_time_type changed;
+  /// Of the file, and of those that it has beside it or directly in its folder. A new value means a
+  /// new scene.
+  FilesStamp stamp{};
   std::string tree{};  // tree_name(), for a scene that may get one; else empty
 };
 
@@ -33,7 +41,7 @@ struct SceneScanOptions {
   bool names_trees = false;
 };
 
-/// Reads the headers of a scene; `changed` is left to the caller. Throws InputError.
+/// Reads the headers of a scene; `stamp` is left to the caller. Throws InputError.
 FoundScene read_scene_headers(const SceneLocation& location, const SceneScanOptions& options);
 
 /// Scans folders for scenes repeatedly. Only headers of new and changed scenes are read, because a
@@ -58,7 +66,7 @@ class SceneFolders {
 
  private:
   struct Known {
-    std::filesystem::file_time_type changed;
+    FilesStamp stamp;
     std::vector<std::filesystem::path> beside;  // files_beside()
     bool good = false;
     FoundScene scene;

@@ -38,7 +38,7 @@ void SceneIndex::merge(std::vector<FoundScene> found,
     SceneRecord& record = record_of(scene.id);
     if (record.pinned) continue;  // --scene names it, too
     record.gone = false;
-    if (record.found.changed != scene.changed) {
+    if (record.found.stamp != scene.stamp) {
       record.outdated = record.entry != nullptr;
       ++record.content;
       record.poster.reset();

@@ -160,10 +160,10 @@ void SceneLibrary::want_walkable_area(const std::string& id) {
     if (record->walkable_area_retry_at && clock_() < *record->walkable_area_retry_at) return;
     const WalkableAreaSource source = source_of(*record, files_.get());
     walkable_areas_.find(
-        id, source, [this, id, source, changed = record->found.changed](const auto& walkable_area) {
+        id, source, [this, id, source, stamp = record->found.stamp](const auto& walkable_area) {
           SceneRecord* const found_for = index_.find(id);
           if (!found_for || !found_for->entry || found_for->walkable_area ||
-              found_for->found.changed != changed ||
+              found_for->found.stamp != stamp ||
               !same_walkable_area(source, source_of(*found_for, files_.get())))
             return;
           found_for->walkable_area = walkable_area;

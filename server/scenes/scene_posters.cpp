@@ -12,10 +12,10 @@ void ScenePosters::want(const std::string& id) {
   if (!representation) return;
   reads_ = true;
   loader_.read_poster(record->found, *representation,
-                      [this, id, lacks_poster, changed = record->found.changed](const auto& kept) {
+                      [this, id, lacks_poster, stamp = record->found.stamp](const auto& kept) {
                         reads_ = false;
                         SceneRecord* const read_for = index_.find(id);
-                        if (!lacks_poster(read_for) || read_for->found.changed != changed) return;
+                        if (!lacks_poster(read_for) || read_for->found.stamp != stamp) return;
                         if (!kept) return load_(*read_for);
                         read_for->poster = kept;
                         changed_();
