@@ -10,7 +10,7 @@ import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
-import { crop_streets, scratch_folder } from './support/scenes';
+import { crop_streets, scratch_folder, write_room } from './support/scenes';
 
 const folder = scratch_folder();
 const scene = path.join(folder, 'city.ply');
@@ -108,6 +108,118 @@ describe('a visitor who walks', () => {
     const stopped = await pose_of(page);
     await page.waitForTimeout(300);
     expect(distance(stopped, await pose_of(page))).toBeLessThan(0.05);
+  });
+});
+
+describe('a visit that begins inside', () => {
+  const servers: Record<string, RunningServer> = {};
+  beforeAll(async () => {
+    for (const [name, sidecar] of [
+      ['estimated', undefined],
+      [
+        'at eye height',
+        {
+          metres_per_unit: 1,
+          start_pose: { position: [-2.5, -eye_m, -1.5], look_at: [3, -1.2, 1] },
+        },
+      ],
+    ] as const) {
+      const room = path.join(scratch_folder(), 'room.ply');
+      write_room(room);
+      if (sidecar) writeFileSync(room.replace('.ply', '.json'), JSON.stringify(sidecar));
+      servers[name] = await start_server(room, ['--min-fps', '0', '--up', '-y']);
+    }
+  });
+  const mode = (page: Page): Promise<string> => page.locator('#mode-label').innerText();
+  /** By finger where the window has touch. */
+  const drag = async (
+    page: Page,
+    { viewport, hasTouch }: { viewport: { width: number; height: number }; hasTouch?: boolean },
+    by: readonly [number, number],
+  ): Promise<void> => {
+    const finger = await page.context().newCDPSession(page);
+    const at = (k: number) => ({
+      x: (viewport.width - by[0]) / 2 + (by[0] * k) / 6,
+      y: (viewport.height - by[1]) / 2 + (by[1] * k) / 6,
+    });
+    const touch = (type: 'touchStart' | 'touchMove' | 'touchEnd', touchPoints: object[]) =>
+      finger.send('Input.dispatchTouchEvent', { type, touchPoints: touchPoints as [] });
+    if (hasTouch) await touch('touchStart', [at(0)]);
+    else await page.mouse.move(at(0).x, at(0).y);
+    if (!hasTouch) await page.mouse.down();
+    for (let k = 1; k <= 6; ++k) {
+      if (hasTouch) await touch('touchMove', [at(k)]);
+      else await page.mouse.move(at(k).x, at(k).y);
+    }
+    if (hasTouch) await touch('touchEnd', []);
+    else await page.mouse.up();
+    await settle(page);
+  };
+  const hold = async (page: Page, key: string, time_ms: number): Promise<void> => {
+    await page.locator('#view').focus();
+    await page.keyboard.down(key);
+    await page.waitForTimeout(time_ms);
+    await page.keyboard.up(key);
+    await settle(page);
+  };
+  const expect_inside = ({ position: [x, y, z] }: Pose): void => {
+    expect(Math.abs(x)).toBeLessThan(4);
+    expect(Math.abs(y + 1.3)).toBeLessThan(1.3);
+    expect(Math.abs(z)).toBeLessThan(3);
+  };
+
+  it.each([
+    ['estimated', 'desktop'],
+    ['estimated', 'phone'],
+    ['at eye height', 'desktop'],
+    ['at eye height', 'phone'],
+  ] as const)('turns on the spot: %s, %s', async (start, window) => {
+    const { page, errors } = await open(servers[start]!.url, windows[window]);
+    const begin = await pose_of(page);
+    expect(await mode(page)).not.toBe('Orbit');
+    await drag(page, windows[window], [120, 0]);
+    const dragged = await pose_of(page);
+    await hold(page, 'ArrowLeft', 1000);
+    const turned = await pose_of(page);
+    for (const pose of [dragged, turned]) expect(distance(begin, pose)).toBeLessThan(0.01);
+    expect(dragged.orientation).not.toEqual(begin.orientation);
+    expect(turned.orientation).not.toEqual(dragged.orientation);
+    expect(errors).toEqual([]);
+  });
+
+  it('walks as soon as the floor is known, and stays inside', async () => {
+    const { page } = await open(servers['at eye height']!.url, windows.desktop);
+    const begin = await pose_of(page);
+    await expect.poll(() => mode(page)).toBe('Walk');
+    expect(distance(begin, await pose_of(page))).toBeLessThan(0.01);
+    await hold(page, 'KeyW', 4000);
+    const walked = await pose_of(page);
+    expect(distance(begin, walked)).toBeGreaterThan(1);
+    expect_inside(walked);
+    expect(Math.abs(height(walked) - eye_m)).toBeLessThan(0.3);
+    await keep_screenshot(page, 'walk-inside');
+  });
+
+  it('stays inside when it orbits', async () => {
+    const { page } = await open(servers['estimated']!.url, windows.desktop);
+    await page.locator('#view').focus();
+    for (let k = 0; k < 3 && (await mode(page)) !== 'Orbit'; ++k) await page.keyboard.press('KeyM');
+    expect(await mode(page)).toBe('Orbit');
+    const begin = await pose_of(page);
+    for (const by of [
+      [300, 0],
+      [-500, 40],
+      [200, -150],
+    ] as const) {
+      await drag(page, windows.desktop, by);
+      expect_inside(await pose_of(page));
+    }
+    expect(distance(begin, await pose_of(page))).toBeGreaterThan(0.3);
+    for (const key of ['ArrowLeft', 'KeyS', 'KeyD', 'KeyE']) {
+      await hold(page, key, 2000);
+      expect_inside(await pose_of(page));
+    }
+    await keep_screenshot(page, 'orbit-inside');
   });
 });
 

@@ -241,12 +241,16 @@ describe('asking what is seen', () => {
     const picks = new Picks((id) => asked.push(id), time);
     const ray = { origin: [1, 0, 0], direction: [0, 0, 1] } as const;
     const [first, second, third] = [picks.at(ray), picks.at(ray), picks.at(ray)];
+    const [nothing, unanswered] = [picks.distance(ray), picks.distance(ray)];
     picks.answered(asked[1]!, { distance: 4, spread: 0.1 });
     picks.answered(asked[0]!, undefined);
+    picks.answered(asked[3]!, undefined);
     picks.answered(99, { distance: 1, spread: 0 });
     expect(await second).toEqual([1, 0, 4]);
     expect(await first).toBeUndefined();
     time.advance(2000);
     expect(await third).toBeUndefined();
+    expect(await nothing).toBe(Infinity);
+    expect(await unanswered).toBeUndefined();
   });
 });

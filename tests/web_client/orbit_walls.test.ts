@@ -57,19 +57,37 @@ const is_inside = (half: Vec3, at: Vec3): boolean =>
   at.every((v, k) => Math.abs(v) < half[k]! + leeway);
 
 describe('an orbiting camera in a hall', () => {
-  it.each(moves)('passes no wall by %j, and still turns', async (move) => {
-    const start: Vec3 = [1, 0, -33];
-    const made = camera('orbit', {
+  const start: Vec3 = [1, 0, -33];
+  const in_hall = (): CameraController =>
+    camera('orbit', {
       start_pose: { position: start, orientation: [0, 0, 0, 1] },
       focus: [1, 0, 0],
       limits_min: [-90, -90, -90],
       limits_max: [90, 90, 90],
       enclosed: true,
     });
+
+  it.each(moves)('passes no wall by %j, and still turns', async (move) => {
+    const made = in_hall();
     made.asks_distance = (ray) => Promise.resolve(wall_along(hall, ray));
     const view = view_of(made);
     for (const at of await play(made, move)) expect(is_inside(hall, at)).toBe(true);
     if (move.drag ?? move.axes?.turn_right) expect(view_of(made)).not.toEqual(view);
+  });
+
+  it.each(moves)('passes no wall by %j that rays from within it do not meet', async (move) => {
+    const made = in_hall();
+    made.asks_distance = (ray) => {
+      const distance = wall_along(hall, ray);
+      return Promise.resolve(distance < 0.4 ? Infinity : distance);
+    };
+    for (const at of await play(made, move)) expect(is_inside(hall, at)).toBe(true);
+  });
+
+  it.each(moves)('stays by %j where no server answers', async (move) => {
+    const made = in_hall();
+    made.asks_distance = () => Promise.resolve(undefined);
+    for (const at of await play(made, move)) expect(at).toEqual(start);
   });
 });
 

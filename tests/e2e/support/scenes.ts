@@ -100,6 +100,30 @@ export function write_patches(
   write_rows(file, rows);
 }
 
+/** A closed room of 8 x 2.6 x 6 m around x = z = 0, with its floor at y = 0 and y down, of opaque balls. */
+export function write_room(file: string): void {
+  const [x1, y1, z1] = [4, 2.6, 3];
+  const apart = 0.1;
+  const rows: number[][] = [];
+  const plate = (corner: Vec3, u: Vec3, v: Vec3, grey: number): void => {
+    const [columns, lines] = [u, v].map((side) => Math.round(Math.hypot(...side) / apart)) as [
+      number,
+      number,
+    ];
+    for (let a = 0; a <= columns; ++a)
+      for (let b = 0; b <= lines; ++b) {
+        const shade = (a >> 3) % 2 === (b >> 3) % 2 ? grey : -grey;
+        const at = corner.map((c, k) => c + (u[k]! * a) / columns + (v[k]! * b) / lines);
+        const size = Array<number>(3).fill(Math.log(0.05));
+        rows.push([...at, shade, grey, -shade, opacity_logit, ...size, 1, 0, 0, 0]);
+      }
+  };
+  for (const y of [0, -y1]) plate([-x1, y, -z1], [2 * x1, 0, 0], [0, 0, 2 * z1], 0.4);
+  for (const x of [-x1, x1]) plate([x, 0, -z1], [0, -y1, 0], [0, 0, 2 * z1], 0.8);
+  for (const z of [-z1, z1]) plate([-x1, 0, z], [0, -y1, 0], [2 * x1, 0, 0], 1.2);
+  write_rows(file, rows);
+}
+
 /** A .ply with the values of `properties`. */
 function write_rows(file: string, rows: readonly (readonly number[])[]): void {
   const header = [

@@ -2,11 +2,11 @@
 import { add, dot, forward, length, normalize, scale, sub, type Vec3 } from '../base/vector';
 import type { Ray } from './ray';
 
-/** Asks how far away the surface is that a ray meets, world units; Infinity: it meets none. */
-export type AskDistance = (ray: Ray) => Promise<number>;
+/** Asks how far away the surface is that a ray meets, world units; Infinity: it meets none; undefined: no answer. */
+export type AskDistance = (ray: Ray) => Promise<number | undefined>;
 
 const most_known = 16;
-const asked_again = 0.75; // of what was asked: then the rest follows
+const asked_again = 0.5; // of what was asked: then the rest follows
 
 /** A way that the camera wants to go. World units. */
 export interface WantedWay {
@@ -16,6 +16,13 @@ export interface WantedWay {
   readonly ahead: Vec3;
   /** What is so near to a ray is as clear as the ray. */
   readonly width: number;
+  /** The camera stays so far from what a ray meets. */
+  readonly clearance: number;
+  /**
+   * A second ray begins so far behind, because a ray meets no surface that is all around its origin. 0: the camera
+   * goes before the answer, and the second ray says whether it has passed anything.
+   */
+  readonly behind: number;
 }
 
 interface KnownWay extends Ray {
@@ -47,7 +54,7 @@ export class ClearWay {
       const width = Math.min(want.width, way.width);
       const along = along_of(way, want.to, width);
       if (along === undefined) continue;
-      if (along <= way.clear - width) {
+      if (along <= way.clear - want.clearance) {
         if (along > asked_again * way.asked) this.ask_along(ask, want);
         return true;
       }
@@ -72,17 +79,22 @@ export class ClearWay {
   }
 
   /** Asks what is ahead, and whether anything opaque lies between here and where it was asked last. */
-  private ask_along(ask: AskDistance, { from, ahead, width }: WantedWay): void {
+  private ask_along(ask: AskDistance, want: WantedWay): void {
     if (this.asks_) return;
     this.asks_ = true;
     const { known_: known, checked_: checked } = this;
+    const { from, ahead, width, clearance, behind } = want;
     const direction = normalize(ahead, forward);
     const come = checked ? sub(from, checked) : ahead;
     const is_near = checked && length(come) > 0 && length(come) <= 2 * length(ahead);
-    const answered = (clear: number, come_clear: number): void => {
+    const answered = (ahead_clear?: number, second?: number): void => {
       this.asks_ = false;
       if (known !== this.known_) return; // of another scene
-      const passes = !is_near || come_clear >= length(come);
+      if (behind > 0 && (ahead_clear === undefined || second === undefined)) return; // asked again
+      const from_behind = behind > 0 ? (second ?? Infinity) - behind : Infinity;
+      // What lies behind the camera is not in its way.
+      const clear = Math.min(ahead_clear ?? Infinity, from_behind >= 0 ? from_behind : Infinity);
+      const passes = behind > 0 || !is_near || (second ?? Infinity) >= length(come);
       this.checked_ = passes ? from : checked;
       if (!passes) this.end_ = checked;
       if (!passes) return;
@@ -90,16 +102,16 @@ export class ClearWay {
       known.splice(most_known);
       const along = this.ventured_ && dot(sub(this.ventured_, from), direction);
       this.ventured_ = undefined;
-      if (along !== undefined && along > clear - width)
-        this.end_ = add(from, scale(direction, Math.max(0, clear - width)));
+      if (along !== undefined && along > clear - clearance)
+        this.end_ = add(from, scale(direction, Math.max(0, clear - clearance)));
     };
-    const anywhere = (): number => Infinity;
-    void Promise.all([
-      ask({ origin: from, direction }).catch(anywhere),
-      checked && is_near
-        ? ask({ origin: checked, direction: normalize(come, forward) }).catch(anywhere)
-        : Infinity,
-    ]).then(([clear, come_clear]) => answered(clear, come_clear));
+    const rays: Ray[] = [{ origin: from, direction }];
+    if (behind > 0) rays.push({ origin: sub(from, scale(direction, behind)), direction });
+    else if (checked && is_near)
+      rays.push({ origin: checked, direction: normalize(come, forward) });
+    const unknown = (): undefined => undefined;
+    const answers = rays.map((ray) => ask(ray).catch(unknown));
+    void Promise.all(answers).then(([clear, second]) => answered(clear, second));
   }
 }
 

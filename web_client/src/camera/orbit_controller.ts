@@ -19,6 +19,7 @@ const dolly_share = 0.12; // of the distance to the focus, a step
 const arc_rad = 0.2; // is asked at once
 const width_share = arc_rad ** 2 / 8; // of that distance: the arc stays so near to its chord
 const steps_ahead = 30; // are asked at once
+const behind_share = 0.1; // of the scene's scale: surfaces are no thicker
 
 /** The camera circles its focus, and passes nothing opaque: there it turns on the spot. */
 export class OrbitController implements ModeController {
@@ -81,10 +82,13 @@ export class OrbitController implements ModeController {
 
   /** Inside, the camera waits for the answer; outside, it comes back where that forbids the way. */
   private may_go(to: Vec3, ahead = scale(sub(to, this.rig_.pose.position), steps_ahead)): boolean {
-    const { pose, enclosed, unlimited } = this.rig_;
+    const { pose, enclosed, unlimited, nearest, reach } = this.rig_;
     if (unlimited || same(pose.position, to)) return true;
     const width = width_share * this.rig_.distance();
-    const allowed = this.way_.allows({ from: pose.position, to, ahead, width });
+    const clearance = Math.max(width, nearest); // nearer than that, pictures show what is behind
+    const behind = enclosed ? behind_share * reach : 0;
+    const from = pose.position;
+    const allowed = this.way_.allows({ from, to, ahead, width, clearance, behind });
     if (allowed === undefined && !enclosed) this.way_.ventured(to);
     return allowed ?? !enclosed;
   }

@@ -22,6 +22,7 @@ import { GestureRouter } from './gestures';
 
 const speed_per_step = 2 ** 0.25;
 const pointing_px = 1; // standard deviation of a click
+const between_rays_ms = 80; // two at once: the server answers 32 a second
 
 export class Navigation {
   readonly camera = new CameraController();
@@ -68,7 +69,8 @@ export class Navigation {
       this.inertia_.enabled = false;
     }
     this.camera.asks_distance = async (ray) => {
-      const distance = await this.distance_along(ray);
+      const pause = new Promise<void>((go_on) => browser_timers.after(between_rays_ms, go_on));
+      const [distance] = await Promise.all([this.picks_.distance(ray), pause]);
       this.loop.wake();
       return distance;
     };

@@ -10,10 +10,14 @@ export interface Hit {
   readonly spread: number;
 }
 
+interface Answer {
+  readonly hit: Hit | undefined;
+}
+
 /** Asks the server what there is along a ray. */
 export class Picks {
   private asked_ = 0;
-  private readonly waiting_ = new Map<number, (hit: Hit | undefined) => void>();
+  private readonly waiting_ = new Map<number, (answer: Answer | undefined) => void>();
 
   constructor(
     private readonly ask_: (id: number, ray: Ray) => void,
@@ -26,10 +30,25 @@ export class Picks {
     return hit && add(ray.origin, scale(ray.direction, hit.distance));
   }
 
-  hit(ray: Ray): Promise<Hit | undefined> {
+  /** What the ray meets; undefined where it meets nothing, or where no answer comes. */
+  async hit(ray: Ray): Promise<Hit | undefined> {
+    return (await this.answer(ray))?.hit;
+  }
+
+  /** How far away what the ray meets is; Infinity: nothing; undefined: no answer comes. */
+  async distance(ray: Ray): Promise<number | undefined> {
+    const answer = await this.answer(ray);
+    return answer && (answer.hit?.distance ?? Infinity);
+  }
+
+  answered(id: number, hit: Hit | undefined): void {
+    this.end(id, { hit });
+  }
+
+  private answer(ray: Ray): Promise<Answer | undefined> {
     const id = ++this.asked_;
     return new Promise((resolve) => {
-      const cancel = this.timers_.after(patience_ms, () => this.answered(id, undefined));
+      const cancel = this.timers_.after(patience_ms, () => this.end(id, undefined));
       this.waiting_.set(id, (answer) => {
         cancel();
         resolve(answer);
@@ -38,8 +57,8 @@ export class Picks {
     });
   }
 
-  answered(id: number, hit: Hit | undefined): void {
-    this.waiting_.get(id)?.(hit);
+  private end(id: number, answer: Answer | undefined): void {
+    this.waiting_.get(id)?.(answer);
     this.waiting_.delete(id);
   }
 }
