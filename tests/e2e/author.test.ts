@@ -44,7 +44,9 @@ describe('an author', () => {
     await page.getByLabel('Title of stop 1').fill('Where I began');
     await page.getByLabel('Caption of stop 1').fill('It was here.');
     await page.mouse.move(500, 300);
+    await page.keyboard.down('Control'); // as browsers tell of a pinch, which moves visitors in every mode
     await page.mouse.wheel(0, -300);
+    await page.keyboard.up('Control');
     await settle(page);
     await page.getByRole('button', { name: 'Add a stop here' }).click();
     await page.getByLabel('Title of stop 2').fill('Nearer');

@@ -107,6 +107,9 @@ describe('an author', () => {
     // Germans hear and read others.
     await page.getByLabel('Texts for').selectOption('de');
     await send('Voice', 'deutsch.wav', tone(10));
+    await expect
+      .poll(() => page.getByLabel('Voice', { exact: true }).inputValue())
+      .toBe('deutsch.wav');
     await send('Sound of the tour', 'meer.wav', tone(3));
     await expect
       .poll(() => page.getByLabel('Sound of the tour', { exact: true }).inputValue())

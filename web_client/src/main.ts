@@ -1,4 +1,5 @@
 import { browser_storage } from './base/browser_storage';
+import { load_part } from './base/load_part';
 import { is_own_error } from './base/own_errors';
 import { leaves_scene_open, list_scenes } from './session/scenes';
 import { AccessToken } from './session/token';
@@ -24,11 +25,13 @@ async function main(): Promise<void> {
   const unsupported = unsupported_card(globalThis);
   if (unsupported) return card.show(unsupported);
   const token = new AccessToken(location, history, browser_storage('sessionStorage'));
-  const requested = new URLSearchParams(location.search).get('scene') ?? '';
+  const query = new URLSearchParams(location.search);
+  const requested = query.get('scene') ?? '';
   const scenes = requested ? [] : await list_scenes(location.href, token.value);
   if (scenes.length > 1 && leaves_scene_open(location.href))
     return show_gallery(scenes, token.value);
-  failed = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''));
+  const author = query.has('author') ? await load_part(() => import('./author_page')) : undefined;
+  failed = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''), author);
 }
 
 void main();

@@ -1,13 +1,10 @@
-// Loads what shows, plays and edits the media of tours, where it is needed.
-import type { MediaFields } from '../author/stops';
+// Loads what shows and plays the media of tours, where it is needed.
 import { load_part } from '../base/load_part';
 import { Signal } from '../base/signal';
-import { make } from '../page/dom';
 import type { AccessToken } from '../session/token';
 import type { TourState } from '../tour/player';
-import { has_media, type Stop, type Tour } from '../tour/tour';
+import { has_media, type Tour } from '../tour/tour';
 import type { TourMediaPart } from '../ui/scene_tours';
-import type { AuthorMedia } from './author_media';
 import type { MediaPart } from './media_part';
 
 /** Calls before the part is loaded are repeated afterwards. */
@@ -59,49 +56,5 @@ export class TourMedia implements TourMediaPart {
     this.part_.show_tours(...this.tours_);
     if (this.state_) this.part_.show(this.state_);
     if (this.arrived_) this.part_.arrived();
-  }
-}
-
-/** The same for the author's fields. */
-export class TourMediaFields implements MediaFields {
-  private fields_: AuthorMedia | undefined;
-  private scene_: readonly [scene_id: string, token: string | undefined] = ['', undefined];
-
-  use(scene_id: string, token: string | undefined): void {
-    this.scene_ = [scene_id, token];
-    this.fields_?.use(scene_id, token);
-  }
-
-  of_stop(
-    stop: () => Stop,
-    n: string,
-    language: string,
-    change: (change: Partial<Stop>, field?: string) => void,
-  ): HTMLElement {
-    return this.filled((fields) => fields.of_stop(stop, n, language, change));
-  }
-
-  of_tour(
-    tour: Tour,
-    language: string,
-    change: (change: Partial<Tour>, field?: string) => void,
-  ): HTMLElement {
-    return this.filled((fields) => fields.of_tour(tour, language, change));
-  }
-
-  private filled(fill: (fields: AuthorMedia) => HTMLElement): HTMLElement {
-    if (this.fields_) return fill(this.fields_);
-    const slot = make('div');
-    void load_part(() => import('./author_media')).then(
-      ({ AuthorMedia: Fields }) => {
-        if (!this.fields_) {
-          this.fields_ = new Fields();
-          this.fields_.use(...this.scene_);
-        }
-        slot.replaceWith(fill(this.fields_));
-      },
-      (error: unknown) => console.warn('media cannot be edited', error),
-    );
-    return slot;
   }
 }

@@ -1,5 +1,5 @@
 import type { MediaFields } from '../author/stops';
-import { TourEditor } from '../author/tour_editor';
+import type { TourEditor } from '../author/tour_editor';
 import type { PageParts } from '../page/parts';
 import { MeasureList } from '../tour/measure_list';
 import { EmbedApi } from './embed';
@@ -10,11 +10,17 @@ import { SceneTours, type TourMediaPart } from './scene_tours';
 import { SharePanel } from './share_panel';
 import { SharedViews } from './shared_views';
 
+/** What pages of authors load. */
+export interface AuthorPage {
+  readonly TourEditor: typeof TourEditor;
+  readonly AuthorMedia: new () => MediaFields;
+}
+
 /** Tours, links to views, portals between scenes, the author's editor, and the page around this one. */
 export function mount_tours(
   parts: PageParts,
   media: TourMediaPart,
-  media_fields: MediaFields,
+  author: AuthorPage | undefined,
 ): {
   readonly tours: SceneTours;
   readonly measures: MeasureList;
@@ -27,10 +33,9 @@ export function mount_tours(
   const views = new SharedViews(parts, tours.player);
   const travel = new PortalTravel(parts, () => views.present);
   tours.portal_taken.listen(({ scene_id, portal }) => travel.enter(portal, scene_id));
-  const is_author = new URLSearchParams(location.search).has('author');
-  const editor = is_author
-    ? new TourEditor(parts, tours, measures, () => scenes.list(), media_fields)
-    : undefined;
+  const list_scenes = (): ReturnType<PortalScenes['list']> => scenes.list();
+  const editor =
+    author && new author.TourEditor(parts, tours, measures, list_scenes, new author.AuthorMedia());
   new SharePanel(parts, measures, (shared) => views.address(shared));
   const { player } = tours;
   const embed = new EmbedApi({ player, navigation, put: (eye) => views.put(eye) });

@@ -7,6 +7,7 @@ import type { StatsReport } from '../stats/metrics';
 import { number } from '../text/number';
 import { operator } from '../text/operator';
 import type { WorkerClient } from '../worker/client';
+import type { FromWorker } from '../worker/messages';
 import type { StatsCharts } from './stats_charts';
 import { rest_note, row_texts, slowest_stage, stats_rows } from './stats_rows';
 
@@ -15,6 +16,9 @@ const interval_ms = 250;
 /** Facts about the server, and how this page shows pictures. */
 const facts = ['renderer', 'encoder', 'presenter', 'server_version'] as const;
 type Facts = Readonly<Record<(typeof facts)[number], string>>;
+
+/** What the worker tells once, or when it changes. */
+export type StatsFact = Extract<FromWorker, { kind: 'welcome' | 'config' | 'presenter' }>;
 
 /** The statistics overlay. Reads nothing and draws nothing while it is hidden. */
 export class StatsPanel {
@@ -52,23 +56,16 @@ export class StatsPanel {
       this.about_,
       save,
     );
-    by_id('stats-panel', HTMLElement).append(in_english);
-    worker_.on('welcome', ({ welcome }) => {
-      this.show_facts({ renderer: welcome.renderer, server_version: welcome.serverVersion });
-    });
-    worker_.on('config', ({ config }) => this.show_facts({ encoder: config.encoder }));
-    worker_.on('presenter', ({ presenter, warp, overscan }) => {
-      this.show_facts({
-        presenter: `${operator.presenters[presenter]} · ${operator.warp[warp]}${overscan_text(overscan)}`,
-      });
-    });
+    const overlay = by_id('stats-panel', HTMLElement);
+    overlay.append(in_english);
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'stats') this.watch(shown);
     });
+    this.watch(!overlay.hidden);
   }
 
-  private show_facts(known: Partial<Facts>): void {
-    this.facts_ = { ...this.facts_, ...known };
+  learn(fact: StatsFact): void {
+    this.facts_ = { ...this.facts_, ...facts_in(fact) };
     this.about_.replaceChildren(
       ...facts.flatMap((fact) => [
         make('dt', {}, operator.stats[fact]),
@@ -120,6 +117,16 @@ export class StatsPanel {
     const json = this.history_.to_json(this.facts_, new Date().toISOString());
     save_file(new Blob([json], { type: 'application/json' }), 'catgs-statistics.json');
   }
+}
+
+function facts_in(fact: StatsFact): Partial<Facts> {
+  if (fact.kind === 'config') return { encoder: fact.config.encoder };
+  if (fact.kind === 'welcome')
+    return { renderer: fact.welcome.renderer, server_version: fact.welcome.serverVersion };
+  const { presenter, warp, overscan } = fact;
+  return {
+    presenter: `${operator.presenters[presenter]} · ${operator.warp[warp]}${overscan_text(overscan)}`,
+  };
 }
 
 /** Shares of the view by which pictures are larger; empty where they are not. */
