@@ -14,7 +14,7 @@ namespace catgs {
 /// How a visitor moves at first.
 enum class CameraMode { unspecified, orbit, fly, walk };
 
-/// What is said of a scene in one language, by its BCP 47 tag.
+/// The texts about a scene in one language, by its BCP 47 tag.
 struct SceneWords {
   std::string language{};
   std::string title{};    // empty: as for all others

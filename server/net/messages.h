@@ -118,7 +118,7 @@ struct Markers {
   std::vector<glm::vec3> points;
 };
 inline constexpr int max_markers = 256;
-/// What a visitor sees of the scene's tours. Numbers count from 1; 0: none.
+/// The stop of the scene's tours that a visitor sees. Numbers count from 1; 0: none.
 struct Show {
   std::uint32_t tour = 0, stop = 0;
   bool arrived = false;  // the camera is at the stop

@@ -28,8 +28,8 @@ struct FoundScene {
   std::string id;
   SceneSize size;
   SceneAbout about;  // of its sidecar, when the scene was found
-  /// Of the file, and of those that it has beside it or directly in its folder. A new value means a
-  /// new scene.
+  /// The stamp of the file, and of those that it has beside it or directly in its folder. A new
+  /// value means a new scene.
   FilesStamp stamp{};
   std::string tree{};  // tree_name(), for a scene that may get one; else empty
 };

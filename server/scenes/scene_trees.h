@@ -38,7 +38,7 @@ class SceneTrees {
   [[nodiscard]] bool ready(const FoundScene& scene) const;
   /// True if a scene that fits into memory is still better drawn from a tree.
   [[nodiscard]] bool deserves_one(const FoundScene& scene) const;
-  /// What of the two looks better.
+  /// The one of the two that looks better.
   [[nodiscard]] TreeChoices& choices() { return choices_; }
   /// True if a scene in pages may look better in its own levels.
   [[nodiscard]] bool undecided(const FoundScene& scene) const;

@@ -31,7 +31,8 @@ class SharedTour {
   /// The host's camera has moved or has come to rest. Followers hear of it, or of a newer one,
   /// within 33 ms or by the next news(), 30 times a second at most.
   void moved(const PoseSample& camera, TimePoint now);
-  /// What the visit sees of the scene's tours, whether it hosts or not. The next news() tell it.
+  /// Takes what the visit sees of the scene's tours, whether it hosts or not. The next news() tell
+  /// it.
   void show(const Show& shown) { shown_ = shown; }
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
   /// nothing: all know it.
@@ -55,7 +56,7 @@ class SharedTour {
   [[nodiscard]] const Participants& positions_told() const { return positions_told_; }
 
  private:
-  /// Of a tour that is under way.
+  /// The news of a tour that is under way.
   [[nodiscard]] Lead lead(LeadState state, std::size_t participants) const;
   void tell_followers(const ServerMessage& message) const;
   void tell_camera(TimePoint now);
