@@ -69,8 +69,9 @@ void SceneLoader::load_beside(Present present, const FoundScene& found,
         return loaded;
       },
       [then = std::move(then)](Finished<LoadedScene> loaded) {
-        then(loaded.result ? *std::move(loaded.result)
-                           : LoadedScene{.entry = nullptr, .gave_way = true});
+        then(loaded.result
+                 ? *std::move(loaded.result)
+                 : LoadedScene{.entry = nullptr, .error = loaded.error, .gave_way = true});
       });
   if (!waits) gives_way_ = id;
 }

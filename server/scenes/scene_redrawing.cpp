@@ -90,14 +90,17 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   if (record && record->entry) residency_.resize(id, need_of(*record->entry));
   if (loaded.unusable_tree) return trees_.discard(found, loaded.error);
   if (!loaded.entry && record && record->entry && record->entry->in_pages && !record->tree_lost)
-    return trees_.choices().decide(found, {});  // its levels do not fit
+    return trees_.choices().take_tree(found);  // its levels cannot be loaded now
   if (!loaded.entry) return trees_.give_up(found, loaded.error);
   const bool still_wanted = record && record->entry && record->entry->renderer == before &&
                             record->found.tree == found.tree && !record->outdated;
   if (!still_wanted) return loader_.free_later(std::move(loaded.entry));
   // Visitors' places are about the origin that their welcome named.
-  if (loaded.entry->facts.origin != record->entry->facts.origin)
+  if (loaded.entry->facts.origin != record->entry->facts.origin) {
+    loader_.free_later(std::move(loaded.entry));
+    if (record->entry->in_pages && !record->tree_lost) return trees_.choices().take_tree(found);
     return trees_.give_up(found, "it has another origin than the scene in memory");
+  }
   if (loaded.compared) trees_.choices().decide(found, *loaded.compared);
   if (loaded.compared && loaded.compared->tree_is_good() != loaded.entry->in_pages)
     return loader_.free_later(std::move(loaded.entry));

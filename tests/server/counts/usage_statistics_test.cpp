@@ -264,7 +264,8 @@ TEST_F(UsageStatisticsTest, OwnersSeeTheirScenesByTitleAndNoOthers) {
   counts_.visit("hall-kdfmqrtv", DeviceKind::phone, "aa");
   counts_.visit("hall-kdfmqrtv", DeviceKind::phone);
   counts_.visit("cellar", DeviceKind::phone, "bb");
-  for (const auto& arguments : {std::vector<std::string>{}, {"scene=hall-kdfmqrtv"}}) {
+  for (const auto& arguments :
+       {std::vector<std::string>{}, {"scene=hall-kdfmqrtv"}, {"scene=cellar"}}) {
     HttpRequest request;
     request.arguments = arguments;
     const std::string page =

@@ -6,7 +6,7 @@ import { file_name_of, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
 import { texts_written } from '../text/translations';
 import { TourDraft, type SceneAbout } from '../tour/draft';
-import { max_tours } from '../tour/limits';
+import { max_measures, max_tours } from '../tour/limits';
 import type { MeasureList } from '../tour/measure_list';
 import { without, type Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
@@ -114,7 +114,10 @@ export class AuthorPanel {
     visits.href = `visits?scene=${encodeURIComponent(this.tools_.navigation.scene_id)}`;
     this.replace_.hidden = true;
     this.tools_.media.use(this.tools_.navigation.scene_id, token);
-    const own = [...without(this.tools_.measures.own, measures), ...measures];
+    const own = [...measures, ...without(this.tools_.measures.own, measures)].slice(
+      0,
+      max_measures,
+    );
     this.draft_.load(tours, about, own);
     this.tools_.measures.enter(own, []);
     this.language_.offer(tours, about);

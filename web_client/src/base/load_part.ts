@@ -22,7 +22,10 @@ export async function load_part<T>(load: () => Promise<T>): Promise<T> {
     } catch (error) {
       if (failures === 0) count(1);
       const pause_ms = pauses_ms[failures];
-      if (pause_ms === undefined) throw error;
+      if (pause_ms === undefined) {
+        missing -= 1; // nobody waits for it any more; the notice stays
+        throw error;
+      }
       await new Promise((resolve) => setTimeout(resolve, pause_ms));
     }
   }

@@ -6,6 +6,7 @@ import { by_id, icon, make } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { number } from '../text/number';
 import { language, text } from '../text/text';
+import { max_stops } from '../tour/limits';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import type { PortalScenes } from './portal_scenes';
@@ -92,7 +93,8 @@ export class Hotspots {
 
   /** Asks the server which hotspots the scene hides from here on. */
   private ask(): void {
-    const points = this.spots_.map(({ stop }) => stop.marker!);
+    // The server takes no more; imported tours may have more, which stay visible.
+    const points = this.spots_.slice(0, max_stops).map(({ stop }) => stop.marker!);
     const about = JSON.stringify(points);
     if (about !== this.asked_about_) {
       this.behind_ = [];

@@ -62,7 +62,7 @@ function mount_measuring(
   set_scale: ((metres_per_unit: number) => void) | undefined,
 ): void {
   const load = loads_once(async () => {
-    const { MeasurePanel } = await import('./measure_panel');
+    const { MeasurePanel } = await load_part(() => import('./measure_panel'));
     new MeasurePanel({ ...parts, measures, set_scale });
   });
   parts.toolbar.panel_shown.listen(({ panel, shown }) => {

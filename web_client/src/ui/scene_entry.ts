@@ -117,6 +117,7 @@ export class SceneEntry {
     const { token } = this.page_;
     const { document } = await fetch_tours(location.href, token.value, scene_id, pass);
     if (load !== this.loads_) return;
+    this.parts_.measures.enter([], []); // those of the scene before
     token.pass = pass;
     const { tours: shown } = this.parts_;
     const readable = tours_for(this.read(document).tours, readers);

@@ -59,6 +59,7 @@ export class SceneTours {
       this.portal_taken.emit({ portal, scene_id }),
     );
     this.hotspots_ = new Hotspots(parts_, scenes_, (stop) => player.go_to(stop));
+    navigation.entered.listen(() => (this.told_ = undefined)); // the server forgets it, too
     navigation.taken_over.listen(() => player.pause());
     navigation.went_back.listen(() => player.leave()); // what is shown is no stop any more
     navigation.pad_pressed.listen((action) => {
@@ -96,6 +97,8 @@ export class SceneTours {
 
   /** Tells those whom this visitor may lead. */
   private tell(shown: ShownStop): void {
+    const { tour_index = 0, stop_index = 0 } = shown;
+    if (tour_index >= max_tours || stop_index >= max_stops) return; // of an imported tour, see above
     if (this.told_ && same_stop(shown, this.told_, true)) return;
     this.told_ = shown;
     this.parts_.worker.post({ kind: 'show', shown });

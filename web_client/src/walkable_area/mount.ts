@@ -158,7 +158,7 @@ export class WalkableArea {
   private async ask_scale(map: WalkMap): Promise<void> {
     const { set_scale } = this.parts_;
     if (!set_scale || this.has_scale_) return;
-    const { DoorQuestion } = await import('./door_question');
+    const { DoorQuestion } = await load_part(() => import('./door_question'));
     if (map !== this.map_) return;
     this.door_ ??= new DoorQuestion({ ...this.parts_, set_scale });
     this.door_.ask(map);
