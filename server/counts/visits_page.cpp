@@ -261,7 +261,7 @@ DayByDay::Parts summary_parts(const HttpRequest& request, std::int64_t unix_s,
   const auto summary =
       std::make_shared<Summary>(Summary{argument(request, "scene"), std::move(shows)});
   if (summary->shows && !summary->only.empty() && !summary->shows(summary->only))
-    summary->only.clear();                                     // not even its title is told
+    summary->only.clear();  // an author does not learn even its title
   if (!summary->only.empty()) summary->scenes[summary->only];  // however many others there are
   parts.of_day = [summary](const std::string& date, const DayCounts& day) {
     summary->take(date, day);
