@@ -1,4 +1,4 @@
-// What README shows: a picture of each feature on the demo scenes. CATGS_PICTURES=deploy/media keeps them there.
+// README shows these: a picture of each feature on the demo scenes. CATGS_PICTURES=deploy/media keeps them there.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';

@@ -228,7 +228,7 @@ describe('a presentation', () => {
     await keep_screenshot(follower, 'together-stop-phone');
     await keep_screenshot(guest, 'together-stop-guest');
     expect([...(await barriers(follower)), ...(await barriers(guest))]).toEqual([]);
-    // Who watches leads nobody, and sees the hotspot where it is in the host's picture.
+    // A spectator leads nobody, and sees the hotspot where it is in the host's picture.
     await guest.keyboard.press('PageDown');
     expect(await guest.locator('#tour-next').isHidden()).toBe(true);
     // Without a stop at the host's, there is none at theirs.

@@ -273,8 +273,16 @@ describe('the floor plan', () => {
 
   it('says its scale, its area, and that it is a sketch, also on paper', async () => {
     const { page } = await open(server.url, windows.desktop);
-    await page.locator('#button-plan').click();
     const plan = page.locator('#plan-panel');
+    const first_words = plan.evaluate(
+      (panel) =>
+        new Promise<string>((done) => {
+          const seen = (): void => done(panel.textContent);
+          new MutationObserver(seen).observe(panel, { childList: true });
+        }),
+    );
+    await page.locator('#button-plan').click();
+    expect(await first_words).toBe('Drawing the plan…');
     await plan.getByRole('button', { name: 'Larger' }).click();
     await plan
       .getByText(/^about [\d.,]+\s(ft²|mi²) · Sketch from the scan, not a survey$/)

@@ -272,7 +272,7 @@ describe('measures', () => {
     list.rename(0, 'Regal');
     expect(measures_for(list.own, ['de'])[0]!.title).toBe('Regal');
     expect(list.own[0]!.title).toBe('Shelf');
-    // What is dragged, or typed in one language, is one edit.
+    // A drag, or a text typed in one language, is one edit.
     expect(fields.filter(Boolean)).toEqual(['mark 0 1', 'name 0 ', 'name 0 de']);
     list.remove_mark(1, 0);
     list.remove(0);

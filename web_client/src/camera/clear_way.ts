@@ -92,7 +92,7 @@ export class ClearWay {
       if (known !== this.known_) return; // of another scene
       if (behind > 0 && (ahead_clear === undefined || second === undefined)) return; // asked again
       const from_behind = behind > 0 ? (second ?? Infinity) - behind : Infinity;
-      // What lies behind the camera is not in its way.
+      // Things behind the camera are not in its way.
       const clear = Math.min(ahead_clear ?? Infinity, from_behind >= 0 ? from_behind : Infinity);
       const passes = behind > 0 || !is_near || (second ?? Infinity) >= length(come);
       this.checked_ = passes ? from : checked;

@@ -226,7 +226,7 @@ export class Navigation {
 
   /** How far away what the ray meets is, world units; Infinity: nothing, or no answer comes. */
   async distance_along(ray: Ray): Promise<number> {
-    return (await this.picks_.hit(ray))?.distance ?? Infinity;
+    return (await this.picks_.distance(ray)) ?? Infinity;
   }
 
   next_mode(): void {

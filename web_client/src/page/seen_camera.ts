@@ -6,7 +6,7 @@ import type { Navigation } from './navigation';
 /**
  * The camera of the picture that the visitor sees. A warped picture shows the newest camera, any other picture
  * its own pose. Another visitor's picture, which this one watches, has its own shape, and is all in the view.
- * What is drawn over the picture follows that.
+ * Everything drawn over the picture follows that.
  */
 export class SeenCamera {
   readonly moved = new Signal<Eye>();

@@ -5,7 +5,7 @@ import type { Signal } from '../base/signal';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { is_for_page } from '../input/key';
-import { by_id } from '../page/dom';
+import { by_id, make } from '../page/dom';
 import type { PageParts } from '../page/parts';
 import { text } from '../text/text';
 import { file_name_of } from '../session/scenes';
@@ -167,6 +167,8 @@ export class WalkableArea {
 
   private async open_plan(): Promise<void> {
     const { map_: map, parts_: parts } = this;
+    if (!this.plan_)
+      this.panel_.replaceChildren(make('p', { textContent: text.floor_plan.drawing }));
     if (!map) return void this.loader_.want();
     const [{ PlanPanel, Dollhouse, house_around }, walking] = await Promise.all([
       load_part(() => import('./plan')),

@@ -323,7 +323,10 @@ export class PlanPanel {
     context.fillRect(0, 0, canvas.width, canvas.height);
     const made = this.picture_of(this.storey_);
     this.picture_.setAttribute('aria-busy', String(!made));
-    if (!made) return;
+    if (!made) {
+      this.words_.textContent = text.floor_plan.drawing;
+      return;
+    }
     const view = this.view_of(made.picture);
     this.drawn_ = view;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
