@@ -76,10 +76,10 @@ std::array<float, max_sh_degree> largest_sh(const GaussianCloud& cloud, std::uin
 
 /// The median of those that are not zero; zero if all are.
 float typical(std::span<float> values) {
-  const auto some = std::ranges::partition(values, [](float v) { return v == 0.0f; });
-  if (some.empty()) return 0.0f;
-  const auto middle = some.begin() + static_cast<std::ptrdiff_t>(some.size() / 2);
-  std::ranges::nth_element(some, middle);
+  const auto some = std::partition(values.begin(), values.end(), [](float v) { return v == 0.0f; });
+  if (some == values.end()) return 0.0f;
+  const auto middle = some + (values.end() - some) / 2;
+  std::nth_element(some, middle, values.end());
   return *middle;
 }
 
