@@ -213,7 +213,8 @@ CameraList read_path(const JsonField& file, const glm::dvec3& origin) {
   const Numbers of{file, file};
   if (const double rate_hz = of.positive({"fps"}); rate_hz > 0.0) {
     list.rate_hz = rate_hz;
-  } else if (const double seconds = of.positive({"seconds"}); seconds > 0.0) {
+  } else if (const double seconds = of.positive({"seconds"});
+             seconds > 0.0 && !list.cameras.empty()) {
     list.rate_hz = static_cast<double>(list.cameras.size()) / seconds;
   }
   return list;
