@@ -257,9 +257,14 @@ wait_until_serving() {
 # server_says KEY: what the server's log gives as "KEY: text", the last time it did.
 server_says() { sed -n "s/.*$1: \([^\"]*\).*/\1/p" "$server_log" | tail -n 1; }
 
-# The ids of the scenes, as the server's log tells in either format, ready for an address.
+# The ids of the scenes, as the server's log tells in either format.
 scene_ids() {
-  sed -n 's/.*\( info \|"message":"\)scene \(.*\): [0-9]* Gaussians, .*/\2/p' "$server_log" |
+  sed -n 's/.*\( info \|"message":"\)scene \(.*\): [0-9]* Gaussians, .*/\2/p' "$server_log"
+}
+
+# The same, ready for an address.
+encoded_scene_ids() {
+  scene_ids |
     sed 's/%/%25/g; s/ /%20/g; s/#/%23/g; s/&/%26/g; s/+/%2B/g; s/\\/%5C/g; s/\[/%5B/g; s/\]/%5D/g; s/"/%22/g; s/</%3C/g; s/>/%3E/g'
 }
 
@@ -273,6 +278,19 @@ row() {
   done
 }
 
+# link_command PAGE: what prints a link to the first scene, or where the words of such links are.
+link_command() {
+  local tokens
+  tokens=$(server_says "visitors need a TOKEN in the address")
+  if [[ $tokens != "catgs-server token --token-key-file "* ]]; then
+    printf 'TOKEN is %s' "$tokens"
+    return
+  fi
+  tokens=${tokens#catgs-server token --token-key-file }
+  printf '%q ' "$bin_dir/catgs-server" token --token-key-file "${tokens% makes one}" --address "$1" \
+    --scene "$(scene_ids | head -n 1)"
+}
+
 print_welcome() {
   local url
   url=$(sed -n "$serving_pattern" "$server_log")
@@ -282,7 +300,7 @@ print_welcome() {
     echo "Your phone warns once about the certificate, which this machine made for itself."
   fi
   local -a ids scene_urls=() hints=("drag to turn, wheel or pinch to zoom, M to fly with W A S D")
-  mapfile -t ids < <(scene_ids)
+  mapfile -t ids < <(encoded_scene_ids)
   local id page=${url%%#*}
   for id in "${ids[@]}"; do
     scene_urls+=("$page?scene=$id${url#"$page"}")
@@ -294,6 +312,7 @@ print_welcome() {
   echo
   row open "$url"
   ((${#scene_urls[@]} < 2)) || row scenes "${scene_urls[@]}"
+  [[ $url != *'#token=TOKEN' ]] || row link "$(link_command "$page")"
   row renderer "$(server_says renderer)"
   row encoder "$(server_says encoder)"
   row metrics "${metrics:-off}"

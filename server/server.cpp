@@ -207,6 +207,12 @@ void Server::State::print_banner() const {
   if (net.admin_port() != 0)
     log_info({.event = "metrics"}, "metrics: http://{}/metrics",
              fmt::format("{}:{}", parse_endpoint(config.admin_bind).address, net.admin_port()));
+  if (config.asks_for_tokens())
+    log_info({.event = "access"}, "visitors need a TOKEN in the address: {}",
+             config.token_key_file.empty()
+                 ? fmt::format("a line of {}", config.token_file)
+                 : fmt::format("catgs-server token --token-key-file {} makes one",
+                               config.token_key_file));
   const std::string rest =
       fmt::format(":{}/{}", net.port(), config.asks_for_tokens() ? "#token=TOKEN" : "");
   const std::string scheme = config.tls_cert.empty() ? "http://" : "https://";
@@ -215,12 +221,6 @@ void Server::State::print_banner() const {
   log_info(
       {.event = "ready"}, "open {} in a browser{}; Ctrl-C stops the server", scheme + host + rest,
       all && host != "localhost" ? ", on this machine also " + scheme + "localhost" + rest : "");
-  if (config.asks_for_tokens())
-    log_info({.event = "access"}, "visitors need a TOKEN in that address: {}",
-             config.token_key_file.empty()
-                 ? fmt::format("a line of {}", config.token_file)
-                 : fmt::format("catgs-server token --token-key-file {} makes one",
-                               config.token_key_file));
 }
 
 }  // namespace catgs

@@ -56,12 +56,11 @@ std::shared_ptr<const SceneEntry> SceneLoader::load_now(const FoundScene& found)
   return load_as(trees_.representation_of(found).value_or(SceneRepresentation()));
 }
 
-void SceneLoader::load_beside(Present present, const FoundScene& found,
-                              const SceneRepresentation& representation, For whom,
-                              std::function<void(LoadedScene)> then) {
-  const bool waits = whom == For::visitors;
-  const auto id = jobs_.start_then(
-      lanes.scenes, waits ? Priority::high : Priority::normal,
+Background::JobId SceneLoader::load_beside(Present present, const FoundScene& found,
+                                           const SceneRepresentation& representation, For whom,
+                                           std::function<void(LoadedScene)> then) {
+  return jobs_.start_then(
+      lanes.scenes, whom == For::visitors ? Priority::high : Priority::normal,
       [this, found, representation, present = std::move(present)](const auto& stop) {
         LoadedScene loaded = load_on(found, representation, stop);
         if (loaded.entry && present.renderer)
@@ -69,11 +68,11 @@ void SceneLoader::load_beside(Present present, const FoundScene& found,
         return loaded;
       },
       [then = std::move(then)](Finished<LoadedScene> loaded) {
+        const bool gave_way = loaded.error.empty();
         then(loaded.result
                  ? *std::move(loaded.result)
-                 : LoadedScene{.entry = nullptr, .error = loaded.error, .gave_way = true});
+                 : LoadedScene{.entry = nullptr, .error = loaded.error, .gave_way = gave_way});
       });
-  if (!waits) gives_way_ = id;
 }
 
 LoadedScene SceneLoader::load_on(const FoundScene& found, const SceneRepresentation& representation,
@@ -95,8 +94,9 @@ TreeComparison SceneLoader::compared(const SceneEntry& entry, const Present& pre
                                      const std::stop_token& stop) const {
   Renderer &tree = entry.in_pages ? *entry.renderer : *present.renderer,
            &other = entry.in_pages ? *present.renderer : *entry.renderer;
-  return compare_tree(tree, other, entry.in_pages && present.whole, entry.facts,
-                      static_cast<float>(config_.detail_px), [&] { throw_if_stopped(stop); });
+  const bool whole = entry.in_pages ? present.whole : !entry.coarse;
+  return compare_tree(tree, other, whole, entry.facts, static_cast<float>(config_.detail_px),
+                      [&] { throw_if_stopped(stop); });
 }
 
 void SceneLoader::read_poster(const FoundScene& found, const SceneRepresentation& representation,

@@ -38,19 +38,21 @@ class SceneLoader {
   enum class For { visitors, jobs };
   void load(const FoundScene& found, const SceneRepresentation& representation, For whom,
             std::function<void(LoadedScene)> then) {
-    load_beside({}, found, representation, whom, std::move(then));
+    const auto id = load_beside({}, found, representation, whom, std::move(then));
+    if (whom == For::jobs) gives_way_ = id;
   }
   /// A representation in memory.
   struct Present {
     std::shared_ptr<Renderer> renderer;  // null: none
     bool whole = false;                  // it has all Gaussians and is no tree
   };
-  /// Compares the new representation with the present one, too.
-  void load_beside(Present present, const FoundScene& found,
-                   const SceneRepresentation& representation, For whom,
-                   std::function<void(LoadedScene)> then);
-  /// Ends a load that no visitor waits for.
-  void give_way() { jobs_.cancel(gives_way_); }
+  /// Compares the new representation with the present one, too. cancel() takes what it returns.
+  Background::JobId load_beside(Present present, const FoundScene& found,
+                                const SceneRepresentation& representation, For whom,
+                                std::function<void(LoadedScene)> then);
+  void cancel(Background::JobId load) { jobs_.cancel(load); }
+  /// Ends a load() that no visitor waits for.
+  void give_way() { cancel(gives_way_); }
   /// Frees a scene in the background, because that may wait for the device.
   void free_later(std::shared_ptr<const SceneEntry> entry);
   /// Looks for scenes in the background. Nothing: a folder cannot be read.

@@ -80,9 +80,11 @@ SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
   const std::uint64_t bytes = trees_.bytes_of(record.found);
   const auto answer = residency_.want(id, trees_.need_of(record.found), now, use_of_);
   if (answer != SceneResidency::Answer::awaited) {
-    if (redrawing_.holds_two_representations()) return SceneAwaited{1s};  // one of them goes soon
-    return refusal(answer, id, bytes);
+    if (!redrawing_.holds_two_representations()) return refusal(answer, id, bytes);
+    redrawing_.give_way();
+    return SceneAwaited{1s};  // one of them goes soon
   }
+  redrawing_.give_way();
   if (residency_.visitor_waits() && residency_.loads_in_background()) loads_.give_way();
   start_next(now);
   const double seconds = static_cast<double>(bytes) / bytes_per_second_;
@@ -144,9 +146,8 @@ void SceneMemory::load_for_poster(SceneRecord& record) {
   const auto step = residency_.next_in_background(id, trees_.need_of(record.found), now, may_leave);
   if (!step) return;
   if (unvisited_.size() >= most_unvisited && step->release.empty()) drop_unvisited();
-  record.poster_tried = true;
-  carry_out(*step, SceneLoader::For::jobs, now);
-  unvisited_.push_back(id);
+  record.poster_tried = carry_out(*step, SceneLoader::For::jobs, now);
+  if (record.poster_tried) unvisited_.push_back(id);
 }
 
 void SceneMemory::drop_unvisited() {
@@ -155,16 +156,19 @@ void SceneMemory::drop_unvisited() {
   if (residency_.resident(id) && use_of_(id) == SceneUse::none) release(id);
 }
 
-void SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For whom,
+bool SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For whom,
                             TimePoint now) {
   for (const std::string& id : step.release) release(id);
   const FoundScene& found = index_.records().at(step.load).found;
   const auto representation = trees_.representation_of(found);
-  if (!representation)
-    return residency_.failed(step.load);  // its tree was lost; visitors ask again
+  if (!representation) {
+    residency_.failed(step.load);  // its tree was lost; visitors ask again
+    return false;
+  }
   loads_.load(found, *representation, whom, [this, id = step.load, now](LoadedScene loaded) {
     on_loaded(id, std::move(loaded), now, clock_());
   });
+  return true;
 }
 
 /// The next scene finds the memory free.

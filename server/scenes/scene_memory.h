@@ -55,7 +55,8 @@ class SceneMemory {
   void load_for_poster(SceneRecord& record);
   /// The oldest scene that was loaded for its poster leaves, unless a job uses it.
   void drop_unvisited();
-  void carry_out(const SceneResidency::Step& step, SceneLoader::For whom, TimePoint now);
+  /// Returns false if nothing is loaded, as the scene's tree is not there any more.
+  bool carry_out(const SceneResidency::Step& step, SceneLoader::For whom, TimePoint now);
   void on_loaded(const std::string& id, LoadedScene loaded, TimePoint started, TimePoint now);
   void release(const std::string& id);
 

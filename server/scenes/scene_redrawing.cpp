@@ -8,6 +8,11 @@
 namespace catgs {
 namespace {
 
+using namespace std::chrono_literals;
+
+// Visitors who wait for memory ask again before.
+constexpr auto retry_after_giving_way = 10s;
+
 /// True if pages of the scene's tree in the cache could not be read.
 bool reads_damaged_tree(const SceneRecord& record) {
   return !record.found.tree.empty() && record.entry->in_pages &&
@@ -32,6 +37,8 @@ bool SceneRedrawing::holds_two_representations() const {
 
 SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
   Tick tick;
+  if (std::exchange(gave_way_, false)) retry_at_ = now + retry_after_giving_way;
+  if (retry_at_ && now >= *retry_at_) retry_at_.reset();
   for (auto& [id, record] : index_.records()) {
     if (record.former_is_left()) {
       loader_.free_later(std::exchange(record.former, nullptr));
@@ -50,7 +57,7 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
                                 : (record.entry->coarse || trees_.deserves_one(found)) &&
                                       trees_.choices().of(found) != TreeChoices::Choice::without;
     if (!wants_tree && record.entry->in_pages && trees_.undecided(found) &&
-        residency_.has_room(trees_.bytes_of(found)))
+        residency_.has_room(trees_.need_of(found, false)))
       start(id);
     if (!wants_tree || trees_.given_up(found)) continue;
     if (!trees_.ready(found))
@@ -66,21 +73,22 @@ SceneRedrawing::Tick SceneRedrawing::on_tick(TimePoint now) {
 }
 
 void SceneRedrawing::start(const std::string& id) {
-  if (busy_ || residency_.busy()) return;
+  if (busy_ || retry_at_ || residency_.busy()) return;
   busy_ = true;
   const SceneRecord& record = *index_.find(id);
   const SceneEntry& before = *record.entry;
   const bool to_tree = !before.in_pages || record.tree_lost;
-  residency_.resize(id, need_of(before).with(to_tree ? trees_.need_of(record.found)
-                                                     : SceneNeed(trees_.bytes_of(record.found))));
+  residency_.resize(id, need_of(before).with(trees_.need_of(record.found, to_tree)));
   SceneLoader::Present present;
   if (!record.tree_lost) present = {before.renderer, !before.in_pages && !before.coarse};
-  loader_.load_beside(
-      std::move(present), record.found, *trees_.representation_of(record.found, to_tree),
-      SceneLoader::For::visitors,
+  // Pages are missing to those who look at a damaged tree.
+  const auto whom = record.tree_lost ? SceneLoader::For::visitors : SceneLoader::For::jobs;
+  const auto load = loader_.load_beside(
+      std::move(present), record.found, *trees_.representation_of(record.found, to_tree), whom,
       [this, id, found = record.found, renderer = before.renderer](LoadedScene loaded) {
         on_loaded(id, found, std::move(loaded), renderer);
       });
+  if (whom == SceneLoader::For::jobs) gives_way_ = load;
 }
 
 void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, LoadedScene loaded,
@@ -88,9 +96,11 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   busy_ = false;
   SceneRecord* const record = index_.find(id);
   if (record && record->entry) residency_.resize(id, need_of(*record->entry));
+  gave_way_ = loaded.gave_way;
+  if (loaded.gave_way) return;
   if (loaded.unusable_tree) return trees_.discard(found, loaded.error);
   if (!loaded.entry && record && record->entry && record->entry->in_pages && !record->tree_lost)
-    return trees_.choices().take_tree(found);  // its levels cannot be loaded now
+    return trees_.choices().take_tree(found, loaded.error);
   if (!loaded.entry) return trees_.give_up(found, loaded.error);
   const bool still_wanted = record && record->entry && record->entry->renderer == before &&
                             record->found.tree == found.tree && !record->outdated;
@@ -98,8 +108,10 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   // Visitors' places are about the origin that their welcome named.
   if (loaded.entry->facts.origin != record->entry->facts.origin) {
     loader_.free_later(std::move(loaded.entry));
-    if (record->entry->in_pages && !record->tree_lost) return trees_.choices().take_tree(found);
-    return trees_.give_up(found, "it has another origin than the scene in memory");
+    constexpr const char* why = "it has another origin than the scene in memory";
+    if (record->entry->in_pages && !record->tree_lost)
+      return trees_.choices().take_tree(found, why);
+    return trees_.give_up(found, why);
   }
   if (loaded.compared) trees_.choices().decide(found, *loaded.compared);
   if (loaded.compared && loaded.compared->tree_is_good() != loaded.entry->in_pages)
@@ -109,8 +121,8 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   record->tree_lost = false;
   record->recall();  // jobs continue with the new representation
   changed_ = true;
-  log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn from its {} from now on", id,
-           record->entry->in_pages ? "tree" : "levels");
+  log_info({.event = "scene_redrawn", .scene = id}, "scene {} is drawn {} from now on", id,
+           record->entry->in_pages ? "from its tree" : "without its tree");
 }
 
 }  // namespace catgs

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,8 @@ class SceneRedrawing {
 
   /// True while a scene takes the memory of two representations. One of them goes soon.
   [[nodiscard]] bool holds_two_representations() const;
+  /// Ends a load that is not for visitors. It is tried again later.
+  void give_way() { loader_.cancel(gives_way_); }
 
   /// See SceneSource.
   [[nodiscard]] std::shared_ptr<const SceneEntry> newer_representation(
@@ -51,7 +54,10 @@ class SceneRedrawing {
   SceneResidency& residency_;
   SceneLoader& loader_;
   bool busy_ = false;
-  bool changed_ = false;  // the listing, since the last tick
+  Background::JobId gives_way_ = 0;    // the last such load
+  bool gave_way_ = false;              // since the last tick
+  std::optional<TimePoint> retry_at_;  // after it gave way
+  bool changed_ = false;               // the listing, since the last tick
 };
 
 }  // namespace catgs

@@ -56,13 +56,11 @@ bool SceneTrees::needs_one(const FoundScene& scene) const {
 }
 
 bool SceneTrees::is_drawn_from_tree(const FoundScene& scene) const {
-  const bool has_other = scene.location.has_levels() || !needs_one(scene);
-  return ready(scene) && !(has_other && choices_.of(scene) == TreeChoices::Choice::without);
+  return ready(scene) && !(has_other(scene) && choices_.of(scene) == TreeChoices::Choice::without);
 }
 
 bool SceneTrees::undecided(const FoundScene& scene) const {
-  return needs_one(scene) && scene.location.has_levels() &&
-         choices_.of(scene) == TreeChoices::Choice::unknown;
+  return ready(scene) && has_other(scene) && choices_.of(scene) == TreeChoices::Choice::unknown;
 }
 
 std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScene& scene,
@@ -78,15 +76,16 @@ std::optional<SceneRepresentation> SceneTrees::representation_of(const FoundScen
   return representation;
 }
 
-std::uint64_t SceneTrees::bytes_of(const FoundScene& scene) const {
+std::uint64_t SceneTrees::bytes_of(const FoundScene& scene, bool from_tree) const {
   SceneSize size = scene.size;
-  size.in_pages |= is_drawn_from_tree(scene) || needs_one(scene);
+  size.in_pages |= (from_tree && is_drawn_from_tree(scene)) || needs_one(scene);
   return most_bytes(size, config_);
 }
 
-SceneNeed SceneTrees::need_of(const FoundScene& scene) const {
+SceneNeed SceneTrees::need_of(const FoundScene& scene, bool from_tree) const {
   // Without its tree, a scene that needs one is in memory as a whole, on a coarser level.
-  return {bytes_of(scene), scene.size.in_pages || is_drawn_from_tree(scene)};
+  return {bytes_of(scene, from_tree),
+          scene.size.in_pages || (from_tree && is_drawn_from_tree(scene))};
 }
 
 void SceneTrees::order(const FoundScene& scene, bool urgent) {

@@ -40,7 +40,7 @@ class SceneTrees {
   [[nodiscard]] bool deserves_one(const FoundScene& scene) const;
   /// The one of the two that looks better.
   [[nodiscard]] TreeChoices& choices() { return choices_; }
-  /// True if a scene in pages may look better in its own levels.
+  /// True if the scene may look better without its tree, with which it was not compared yet.
   [[nodiscard]] bool undecided(const FoundScene& scene) const;
   /// The representation in which the scene can be loaded now; nothing: its tree has to be built
   /// first. `from_tree`: from a tree if that is there and suits it.
@@ -48,9 +48,9 @@ class SceneTrees {
                                                                      bool from_tree = true) const;
   /// The most memory that the scene takes on each device in that representation, or as a tree,
   /// bytes.
-  [[nodiscard]] std::uint64_t bytes_of(const FoundScene& scene) const;
+  [[nodiscard]] std::uint64_t bytes_of(const FoundScene& scene, bool from_tree = true) const;
   /// The same, as the residency counts it.
-  [[nodiscard]] SceneNeed need_of(const FoundScene& scene) const;
+  [[nodiscard]] SceneNeed need_of(const FoundScene& scene, bool from_tree = true) const;
 
   /// Orders a scene's tree, unless it is ordered already, or could recently not be built or used.
   /// `urgent`: visitors wait for it. Then a build that nobody waits for is made later.
@@ -89,6 +89,10 @@ class SceneTrees {
   [[nodiscard]] SharedBuild running() const;
   /// True if the scene can be in memory as a tree alone.
   [[nodiscard]] bool needs_one(const FoundScene& scene) const;
+  /// True if it can be in memory without a tree.
+  [[nodiscard]] bool has_other(const FoundScene& scene) const {
+    return scene.location.has_levels() || !needs_one(scene);
+  }
   /// True if its tree is there and suits it.
   [[nodiscard]] bool is_drawn_from_tree(const FoundScene& scene) const;
   /// Builds on this thread. Throws InputError.

@@ -1,7 +1,6 @@
 #include "server/scenes/tree_choices.h"
 
 #include <optional>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -44,12 +43,22 @@ TreeChoices::Choice TreeChoices::of(const FoundScene& scene) const {
 void TreeChoices::decide(const FoundScene& scene, const TreeComparison& comparison) {
   const bool tree = comparison.tree_is_good();
   log_info({.event = "tree_compared", .scene = scene.id},
-           "scene {}: pictures have {:.1f} dB from its tree and {:.1f} dB without: it is drawn {}",
-           scene.id, comparison.tree_db, comparison.levels_db, tree ? "from its tree" : "without");
+           "scene {}: pictures have {}: it is drawn {}", scene.id,
+           comparison.fits ? fmt::format("{:.1f} dB from its tree and {:.1f} dB without",
+                                         comparison.tree_db, comparison.levels_db)
+                           : "no part whose tree fits into memory",
+           tree ? "from its tree" : "without");
   choices_[scene.tree] = tree ? Choice::tree : Choice::without;
   if (files_)
     files_->write(name_of(scene), std::string(tree ? tree_text : without_text),
                   DerivedFiles::most_choices);
+}
+
+void TreeChoices::take_tree(const FoundScene& scene, std::string_view why) {
+  log_warning({.event = "tree_not_compared", .scene = scene.id},
+              "scene {}: it is drawn from its tree, which is compared with nothing: {}", scene.id,
+              why);
+  choices_[scene.tree] = Choice::tree;
 }
 
 }  // namespace catgs

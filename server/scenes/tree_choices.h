@@ -3,6 +3,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "server/config/config.h"
 #include "server/scenes/derived_files.h"
@@ -24,7 +25,7 @@ class TreeChoices {
   [[nodiscard]] Choice of(const FoundScene& scene) const;
   void decide(const FoundScene& scene, const TreeComparison& comparison);
   /// The tree is drawn until the next start, since nothing could be compared with it.
-  void take_tree(const FoundScene& scene) { choices_[scene.tree] = Choice::tree; }
+  void take_tree(const FoundScene& scene, std::string_view why);
   /// Forgets all trees but these, which the files do not.
   void keep(const std::set<std::string>& names) {
     std::erase_if(choices_, [&](const auto& of) { return !names.contains(of.first); });

@@ -113,7 +113,7 @@ TreeComparison compare_tree(Renderer& tree, Renderer& levels, bool whole, const 
         const Picture part = right.of(cropped(cameras[i], {x, y}, part_px));
         if (part.coarsest_px == 0.0f) errors.add(part, of_tree[i], of_levels[i], {x, y});
       }
-  if (errors.values == 0) return {0.0, 0.0, whole};
+  if (errors.values == 0) return {.whole = whole, .fits = false};
   const auto count = static_cast<double>(errors.values);
   return {psnr_db(errors.tree / count), psnr_db(errors.levels / count), whole};
 }

@@ -36,7 +36,11 @@ for scene in "$@"; do
 done
 echo "12:00:00.000 info renderer: CPU"
 [[ "$*" == *--admin-bind* ]] || echo "12:00:00.000 info metrics: http://127.0.0.1:9090/metrics"
-echo "12:00:00.000 info open http://127.0.0.1:7/ in a browser; Ctrl-C stops the server"
+tokens=""
+[[ "$*" != *--token-key-file* ]] || tokens="catgs-server token --token-key-file my key makes one"
+[[ "$*" != *"--token-file"* ]] || tokens="a line of tokens.txt"
+[[ -z $tokens ]] || echo "12:00:00.000 info visitors need a TOKEN in the address: $tokens"
+echo "12:00:00.000 info open http://127.0.0.1:7/${tokens:+#token=TOKEN} in a browser; Ctrl-C stops the server"
 """
 
 
@@ -305,6 +309,18 @@ class Serving(Machine):
         self.assertRegex(output, r"  scenes +http://127\.0\.0\.1:7/\?scene=a\n"
                                  r" +http://127\.0\.0\.1:7/\?scene=my%20room%20%232\n")
         self.assertNotIn("?scene=", self.serve(scenes[0], *self.options()).stdout)
+
+    def test_links_are_told_where_the_address_needs_a_token(self):
+        scene = self.scene("my room.ply")
+        link = (f"  link      {self.bin}/catgs-server token --token-key-file my\\ key "
+                "--address http://127.0.0.1:7/ --scene my\\ room")
+        for options, wanted in ((["--token-key-file", "my key"], link),
+                                (["--token-file", "tokens.txt"], "  link      TOKEN is a line of tokens.txt"),
+                                (["--open"], None)):
+            output = self.serve(scene, *options, *self.options()).stdout
+            self.assertEqual("#token=TOKEN\n" in output, wanted is not None)
+            self.assertEqual([line.rstrip() for line in output.splitlines() if "  link " in line],
+                             [wanted] if wanted else [])
 
     def test_hints_are_for_what_was_not_done(self):
         output = self.serve(*self.options()).stdout

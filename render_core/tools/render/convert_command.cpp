@@ -146,10 +146,12 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
     fmt::print(stderr, "note: {} {}\n", printable(sidecar.string()), why);
   };
   if (keeps_sidecar(conversion))
-    return leave(shares_sidecar(conversion) || tells_hints(sidecar, written)
+    return leave(shares_sidecar(conversion) ? "stays as it is: both scenes use it"
+                 : tells_hints(sidecar, written)
                      ? "exists and was left as it is"
-                     : "exists and was left as it is, since an author changed it. What it tells of "
-                       "the view may be of another scene: look, or move it away and convert again");
+                     : "exists and was left as it is, since an author changed "
+                       "it. What it tells of the view may be of another scene: "
+                       "look, or move it away and convert again");
   if (moves(conversion, done) && shares_sidecar(conversion))
     return leave("was not written, since it would be the input's, too");
   nlohmann::ordered_json page_fields = page_fields_in_sidecar(conversion.in.hints);

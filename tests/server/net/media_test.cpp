@@ -117,6 +117,31 @@ TEST_F(Media, AnswerRangesOfBytes) {
   }
 }
 
+TEST_F(Media, FollowersWithoutALinkGetTheMediaOfTheirGuidesSceneAlone) {
+  WireClient guide(server->port());
+  const std::string watch = guide.greet(hello_by(make_link("viewer", hall), hall)).watch_token();
+  guide.present();
+  v1::ClientMessage hello = hello_by({});
+  hello.mutable_hello()->set_watch(watch);
+  hello.mutable_hello()->set_follow(true);
+  WireClient follower(server->port());
+  const std::string pass = "?pass=" + follower.greet(hello).scene_pass();
+  const std::string file = path_of("media/door.jpg"), other = "/api/scenes/hall0/media/door.jpg";
+  const std::pair<std::string, int> cases[] = {{file + pass, 200},
+                                               {path_of("tours") + pass, 200},
+                                               {path_of("media/absent.jpg") + pass, 404},
+                                               {file, 401},
+                                               {file + "?pass=", 401},
+                                               {file + pass + "x", 401},
+                                               {other + pass, 401},
+                                               {path_of("media") + pass, 401},
+                                               {path_of("poster.jpg") + pass, 401}};
+  for (const auto& [path, status] : cases)
+    EXPECT_EQ(http_get(server->port(), path).status, status) << path;
+  EXPECT_EQ(http_get(server->port(), file + pass).body, jpeg_file());
+  EXPECT_EQ(http_put(server->port(), file + pass, jpeg_file(), {}).status, 401);
+}
+
 TEST_F(Media, ClientsThatGoOrStallLoseOnlyTheirConnection) {
   const std::string film = long_film(6 << 20);
   write("long.mp4", film);

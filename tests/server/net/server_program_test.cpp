@@ -210,9 +210,9 @@ TEST(ServerProgram, TheAddressThatItPrintsOpens) {
     const std::string log = program.log().substr(program.log().find("open http://") + 5);
     return log.substr(0, log.find(' '));
   };
-  Program local({"--token-file", tokens}, "a line of");
+  Program local({"--token-file", tokens}, "Ctrl-C");
   EXPECT_THAT(printed(local), MatchesRegex("http://127.0.0.1:[0-9]+/#token=TOKEN"));
-  EXPECT_THAT(local.log(), HasSubstr("visitors need a TOKEN in that address: a line of " + tokens));
+  EXPECT_THAT(local.log(), HasSubstr("visitors need a TOKEN in the address: a line of " + tokens));
   Program open({"--bind", "0.0.0.0", "--open", "--log-format", "json"}, "Ctrl-C");
   const std::string address = printed(open).substr(std::string("http://").size());
   const std::string host = address.substr(0, address.find('/'));

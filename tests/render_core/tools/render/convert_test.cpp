@@ -245,6 +245,8 @@ TEST_F(Convert, OutputsBeginWhereTheirInputDoes) {
     EXPECT_EQ(convert("twice.ply", fmt::format("--rotate=0,{},0 --scale 3", turn)).exit_code, 0);
   add_title("twice.json");
   EXPECT_EQ(convert("twice.ply", "--rotate=0,32,0 --scale 3").exit_code, 2);
+  EXPECT_THAT(run(fmt::format("convert {} {}", path("twice.ply"), path("twice.spz"))).out,
+              HasSubstr("twice.json stays as it is: both scenes use it"));
   // A moved view is not that of the input, which has the same sidecar.
   const Outcome moved = convert("ball.spz", "--scale 2");
   EXPECT_EQ(moved.exit_code, 0) << moved.out;
