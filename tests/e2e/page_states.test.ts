@@ -108,6 +108,20 @@ describe('page', () => {
     expect(await told.isVisible()).toBe(false);
   });
 
+  it('shows the scene to an author whose editor has not loaded, and tries again', async () => {
+    const server = await start_fake_server(stream);
+    const { page } = await new_page();
+    let is_away = true;
+    await page.route('**/author_page-*.js', (route) =>
+      is_away ? route.abort() : route.continue(),
+    );
+    await page.goto(`${server.url}?author`);
+    await page.locator('#card').waitFor({ state: 'hidden' });
+    await page.getByText('Part of this page has not loaded').waitFor();
+    is_away = false;
+    await page.getByRole('region', { name: 'Make a tour' }).waitFor();
+  });
+
   it('says that a browser is too old only when the script does not come', async () => {
     const server = await start_fake_server(stream);
     const { page } = await new_page();

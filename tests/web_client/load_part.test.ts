@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { load_part, part_missing } from '#client/base/load_part';
+import { load_author_page } from '#client/ui/mount_tours';
 
 describe('a part of the page', () => {
   let told: boolean[];
@@ -39,5 +40,12 @@ describe('a part of the page', () => {
     expect(await part).toBe('given up');
     expect(load).toHaveBeenCalledTimes(7);
     expect(told).toEqual([true]);
+  });
+
+  it('is asked for until it comes, if it is the editor', async () => {
+    const page = load_author_page(failing(10) as never);
+    await vi.advanceTimersByTimeAsync(90_000);
+    expect(await page).toBe('part');
+    expect(told.at(-1)).toBe(false);
   });
 });

@@ -110,6 +110,9 @@ describe('the player', () => {
     expect(state()).toMatchObject({ tour_index: 1, stop_index: 2 });
     player.be_shown(0, 9);
     expect(state()).toMatchObject({ tour_index: 0, stop: undefined });
+    player.be_shown(1, 2);
+    player.be_shown(undefined, undefined); // the leader sees nothing of the tours
+    expect(state()).toMatchObject({ tour_index: 1, stop: undefined });
   });
 
   it('stays while a voice speaks, however short the stay is', () => {

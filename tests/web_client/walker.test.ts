@@ -99,7 +99,7 @@ describe('a walk file', () => {
     await forged('person', (view) => view.setFloat32(76, -1, true));
     await forged('start', (view) => view.setFloat32(92, 2000, true));
     await forged('size', (view) => view.setUint32(104, 5000, true));
-    await forged('places', (view) => view.setUint32(112, 0xffffffff, true));
+    await forged('positions', (view) => view.setUint32(112, 0xffffffff, true));
     await forged('tile side', (view) => view.setUint32(116, 32, true));
     await forged('packed bytes', (view) =>
       view.setUint32(120, view.getUint32(120, true) - 1, true),

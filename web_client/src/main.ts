@@ -1,5 +1,4 @@
 import { browser_storage } from './base/browser_storage';
-import { load_part } from './base/load_part';
 import { is_own_error } from './base/own_errors';
 import { leaves_scene_open, list_scenes } from './session/scenes';
 import { AccessToken } from './session/token';
@@ -30,8 +29,7 @@ async function main(): Promise<void> {
   const scenes = requested ? [] : await list_scenes(location.href, token.value);
   if (scenes.length > 1 && leaves_scene_open(location.href))
     return show_gallery(scenes, token.value);
-  const author = query.has('author') ? await load_part(() => import('./author_page')) : undefined;
-  failed = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''), author);
+  failed = mount_viewer(card, token, requested || (scenes[0]?.id ?? ''), query.has('author'));
 }
 
 void main();

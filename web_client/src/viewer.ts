@@ -7,18 +7,18 @@ import { AwakeScreen } from './ui/awake_screen';
 import type { CardView } from './ui/card';
 import { mount_panels } from './ui/mount_panels';
 import { mount_session } from './ui/mount_session';
-import { mount_tours, type AuthorPage } from './ui/mount_tours';
+import { mount_tours } from './ui/mount_tours';
 import { Pointing } from './ui/pointing';
 import { SharedTour } from './ui/shared_tour';
 import { StreamSize } from './ui/stream_size';
 import { WalkableArea } from './walkable_area/mount';
 
-/** Returns what tells of an error of the page. `scene_id`: empty for the server's first scene. `author`: of authors. */
+/** Returns what tells of an error of the page. `scene_id`: empty for the server's first scene. `is_author`: the editor loads. */
 export function mount_viewer(
   card: CardView,
   token: AccessToken,
   scene_id: string,
-  author: AuthorPage | undefined,
+  is_author: boolean,
 ): (message: string) => void {
   // `?ui=0`, for frames of other pages: nothing but the picture and the tour.
   document.body.classList.toggle('bare', new URLSearchParams(location.search).get('ui') === '0');
@@ -26,7 +26,7 @@ export function mount_viewer(
   const { view, worker, navigation, clock } = parts;
   const stream_size = new StreamSize(view, worker);
   const media = new TourMedia(token);
-  const { tours, measures, set_scale } = mount_tours(parts, media, author);
+  const { tours, measures, set_scale } = mount_tours(parts, media, is_author);
   media.enlarged.listen(() => tours.player.pause());
   mount_panels(parts, stream_size, measures, set_scale);
   const walkable_area = new WalkableArea({

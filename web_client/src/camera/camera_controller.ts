@@ -13,7 +13,7 @@ import {
   type Vec3,
 } from '../base/vector';
 import { CameraRig, default_fov_y_rad } from './camera_rig';
-import { ClearWay, type AskDistance } from './clear_way';
+import { ClearPath, type AskDistance } from './clear_path';
 import type { Eye, Pose } from './eye';
 import { glide, glide_time_s, type Flight } from './flight';
 import { FlyController } from './fly_controller';
@@ -34,9 +34,9 @@ const level_time_s = 0.25;
 export class CameraController {
   private readonly rig_ = new CameraRig();
   private readonly walk_ = new WalkController(this.rig_);
-  private readonly clear_way_ = new ClearWay();
+  private readonly clear_path_ = new ClearPath();
   private readonly modes_: Readonly<Record<CameraMode, ModeController>> = {
-    orbit: new OrbitController(this.rig_, this.clear_way_),
+    orbit: new OrbitController(this.rig_, this.clear_path_),
     fly: new FlyController(this.rig_),
     walk: this.walk_,
   };
@@ -101,7 +101,7 @@ export class CameraController {
 
   /** Who says how far an orbiting camera may go; undefined: anywhere. */
   set asks_distance(ask: AskDistance | undefined) {
-    this.clear_way_.ask = ask;
+    this.clear_path_.ask = ask;
   }
 
   /** Who walks on the walkable area; undefined: it is not known, or there is none. */
@@ -113,7 +113,7 @@ export class CameraController {
     this.end_flight(false);
     this.scene_ = scene;
     this.rig_.load(scene);
-    this.clear_way_.forget();
+    this.clear_path_.forget();
     this.smoothing_.clear();
   }
 

@@ -11,7 +11,7 @@ import {
   type Vec3,
 } from '../base/vector';
 import type { CameraRig } from './camera_rig';
-import type { ClearWay } from './clear_way';
+import type { ClearPath } from './clear_path';
 import type { Eye } from './eye';
 import type { ModeController } from './mode';
 
@@ -28,7 +28,7 @@ export class OrbitController implements ModeController {
 
   constructor(
     private readonly rig_: CameraRig,
-    private readonly way_: ClearWay,
+    private readonly way_: ClearPath,
   ) {}
 
   get sight_distance(): number {
@@ -89,7 +89,7 @@ export class OrbitController implements ModeController {
     const behind = enclosed ? behind_share * reach : 0;
     const from = pose.position;
     const allowed = this.way_.allows({ from, to, ahead, width, clearance, behind });
-    if (allowed === undefined && !enclosed) this.way_.ventured(to);
+    if (allowed === undefined && !enclosed) this.way_.moved_unchecked(to);
     return allowed ?? !enclosed;
   }
 

@@ -99,13 +99,14 @@ export class TourPlayer {
     this.env_.reached(this.tour_index_, stop_index);
   }
 
-  /** Shows a stop, or the tour alone, to a visitor whose camera somebody else leads. */
-  be_shown(tour_index: number, stop_index: number | undefined): void {
-    const tour = this.tours_[tour_index];
+  /** Shows a stop, or the tour alone, to a visitor whose camera somebody else leads. Undefined: the same tour, no stop. */
+  be_shown(tour_index: number | undefined, stop_index: number | undefined): void {
+    const index = tour_index ?? this.tour_index_;
+    const tour = this.tours_[index];
     if (!tour) return;
     this.set_out();
     this.playing_ = false;
-    this.tour_index_ = tour_index;
+    this.tour_index_ = index;
     this.stop_index_ = stop_index !== undefined && tour.stops[stop_index] ? stop_index : undefined;
     this.tell();
   }

@@ -23,7 +23,7 @@ interface EntryParts {
   readonly tours: SceneTours;
   readonly views: SharedViews;
   readonly travel: PortalTravel;
-  readonly editor: TourEditor | undefined; // of authors
+  readonly editor: Promise<TourEditor> | undefined; // of authors; it may load for long
   readonly embed: EmbedApi;
   readonly measures: MeasureList;
 }
@@ -87,17 +87,18 @@ export class SceneEntry {
     // Authors see each text in the language that they edit.
     const readable = tours_for(tours, editor ? [] : readers);
     shown.offer(readable);
-    if (editor)
-      editor.load(tours, about_of(scene), may_save ? token : undefined, document.etag, measures);
-    else list.enter(list.own, measures_for(measures, readers));
+    if (!editor) list.enter(list.own, measures_for(measures, readers));
     // No tour starts by itself for an author, or for a visitor whose link leads to a view or a stop.
     const has_view = shared.eye !== undefined || shared.stop_index !== undefined;
     shown.load(readable, has_view || editor !== undefined || navigation.led);
-    if (load === 1 && editor) toolbar.open('author');
     views.show_stop(shared, true);
     travel.arrived();
     const stops = (readable[0]?.stops ?? []).map(({ title }) => title);
     embed.say({ catgs: 'ready', scene: scene_name(scene_id), stops });
+    const ready = await editor;
+    if (!ready || load !== this.loads_) return;
+    ready.load(tours, about_of(scene), may_save ? token : undefined, document.etag, measures);
+    if (load === 1) toolbar.open('author');
   }
 
   private say_unread(problems: readonly string[]): void {

@@ -88,8 +88,7 @@ export class SceneTours {
     const { guided_: before } = this;
     this.guided_ = shown;
     document.body.classList.toggle('shows-stop', shown?.stop_index !== undefined);
-    if (!shown || shown.tour_index === undefined || (before && same_stop(shown, before, true)))
-      return;
+    if (!shown || (before && same_stop(shown, before, true))) return;
     if (!before || !same_stop(shown, before))
       this.player.be_shown(shown.tour_index, shown.stop_index);
     if (shown.arrived) this.media_.arrived();

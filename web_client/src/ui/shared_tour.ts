@@ -101,7 +101,7 @@ export class SharedTour {
       else if (this.wants_) this.go_along();
     } else if (eye && this.wants_) this.follow(eye);
     if (this.role_ === 'following' && differ(before, lead)) this.show();
-    if (lead.shown && (this.role_ === 'following' || this.role_ === 'watching'))
+    if (this.role_ === 'following' || this.role_ === 'watching')
       this.shown.emit(stop_of(lead.shown));
   }
 
@@ -265,11 +265,11 @@ export class SharedTour {
   }
 }
 
-/** Numbers on the wire count from 1. */
-const stop_of = ({ tour, stop, arrived }: NonNullable<Lead['shown']>): ShownStop => ({
-  tour_index: tour > 0 ? tour - 1 : undefined,
-  stop_index: stop > 0 ? stop - 1 : undefined,
-  arrived,
+/** Numbers on the wire count from 1. Undefined: the host sees nothing of the tours. */
+const stop_of = (shown: Lead['shown']): ShownStop => ({
+  tour_index: shown?.tour ? shown.tour - 1 : undefined,
+  stop_index: shown?.stop ? shown.stop - 1 : undefined,
+  arrived: shown?.arrived ?? false,
 });
 
 /** Whether more than the camera is new. */

@@ -1,5 +1,5 @@
 // Short paths on a WalkMap (A*, Hart, Nilsson and Raphael 1968), for a tap on a point to go to.
-import { Breaths } from '../base/breaths';
+import { Yields } from '../base/yields';
 import { column_in_tile, height_of, require, tile_at, tiles_in, type Tile } from './tiles';
 import { clear_in, type Stand, type WalkMap } from './walk_map';
 import { straight } from './walker';
@@ -151,10 +151,10 @@ export async function find_path(
   };
   reach(begin, Math.floor(from.east), Math.floor(from.north), 0, begin);
   const beside = [-1, -1, -1, -1];
-  const breaths = new Breaths();
+  const yields = new Yields();
   for (let k = 0; !open.empty && state[end] !== State.done; ++k) {
     if (k % nodes_a_breath === 0) {
-      await breaths.take();
+      await yields.if_due();
       if (!wanted()) return [];
     }
     const node = open.pop();
@@ -192,18 +192,18 @@ export async function find_path(
     });
   }
   path[path.length - 1] = from;
-  return with_straight_pieces(map, path.reverse(), breaths);
+  return with_straight_pieces(map, path.reverse(), yields);
 }
 
 /** Leaves out what a straight line passes. */
 async function with_straight_pieces(
   map: WalkMap,
   path: readonly Stand[],
-  breaths: Breaths,
+  yields: Yields,
 ): Promise<Stand[]> {
   const turns = [path[0]!];
   for (let at = 0; at + 1 < path.length; ) {
-    await breaths.take();
+    await yields.if_due();
     let next = at + 1;
     for (
       let far = Math.min(path.length - 1, at + most_skipped);

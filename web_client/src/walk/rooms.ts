@@ -1,5 +1,5 @@
 // The rooms of a storey and their areas, for the plan. Pure.
-import { Breaths } from '../base/breaths';
+import { Yields } from '../base/yields';
 import { height_of, Kind, kind_of } from './tiles';
 import { block_around, positions_at, storey_at, type Block, type WalkMap } from './walk_map';
 
@@ -51,9 +51,9 @@ async function floor_of(
 ): Promise<Uint8Array> {
   const width = east - west + 2;
   const floor = new Uint8Array(width * (north - south + 2));
-  const breaths = new Breaths();
+  const yields = new Yields();
   for (let row = south; row < north; ++row) {
-    await breaths.take();
+    await yields.if_due();
     for (let column = west; column < east; ++column) {
       const top = positions_at(map, column, row).findLast(in_storey);
       if (top !== undefined && kind_of(top) !== Kind.obstacle)
@@ -66,7 +66,7 @@ async function floor_of(
 /** How far each column is from what is no floor: chamfer distance, 3 a cell. */
 async function distances(floor: Uint8Array, width: number): Promise<Uint16Array> {
   const far = Uint16Array.from(floor, (is_floor) => is_floor * 0xfff0);
-  const breaths = new Breaths();
+  const yields = new Yields();
   const shorten = (at: number, way: 1 | -1): void => {
     if (far[at] === 0) return;
     const [near, line] = [at - way, at - way * width];
@@ -79,11 +79,11 @@ async function distances(floor: Uint8Array, width: number): Promise<Uint16Array>
     );
   };
   for (let at = 0; at < far.length; ++at) {
-    if (at % width === 0) await breaths.take();
+    if (at % width === 0) await yields.if_due();
     shorten(at, 1);
   }
   for (let at = far.length - 1; at >= 0; --at) {
-    if (at % width === 0) await breaths.take();
+    if (at % width === 0) await yields.if_due();
     shorten(at, -1);
   }
   return far;
@@ -93,10 +93,10 @@ async function distances(floor: Uint8Array, width: number): Promise<Uint16Array>
 async function cores(from_wall: Uint16Array, width: number): Promise<Uint16Array> {
   const rooms = new Uint16Array(from_wall.length);
   const is_core = (at: number): boolean => from_wall[at]! > (door_cells / 2) * beside;
-  const breaths = new Breaths();
+  const yields = new Yields();
   let count = 0;
   for (let first = 0; first < rooms.length && count < 0xffff; ++first) {
-    if (first % width === 0) await breaths.take();
+    if (first % width === 0) await yields.if_due();
     if (rooms[first] !== 0 || !is_core(first)) continue;
     rooms[first] = ++count;
     const open = [first];
@@ -112,13 +112,13 @@ async function cores(from_wall: Uint16Array, width: number): Promise<Uint16Array
 
 /** All floor belongs to the room that is nearest. */
 async function grown(floor: Uint8Array, width: number, rooms: Uint16Array): Promise<Uint16Array> {
-  const breaths = new Breaths();
+  const yields = new Yields();
   let edge: number[] = [];
   rooms.forEach((room, at) => {
     if (room !== 0) edge.push(at);
   });
   while (edge.length > 0) {
-    await breaths.take();
+    await yields.if_due();
     const wider: number[] = [];
     for (const at of edge)
       for (const next of [at - 1, at + 1, at - width, at + width])

@@ -1,6 +1,6 @@
 // The columns of a WalkMap, unpacked where somebody needs them: a map of two million places takes its file's bytes.
 import { unzlibSync } from 'fflate';
-import { Breaths } from '../base/breaths';
+import { Yields } from '../base/yields';
 
 const tile_bits = 6;
 export const tile_side = 2 ** tile_bits; // columns
@@ -123,10 +123,10 @@ export class PackedTiles implements Tiles {
 
   /** Throws an Error where a tile cannot be read, so that at() never does. Lets the page draw meanwhile. */
   async check(): Promise<void> {
-    const breaths = new Breaths();
+    const yields = new Yields();
     let count = 0;
     for (let t = 0; t < this.unpacked_.length; ++t) {
-      await breaths.take();
+      await yields.if_due();
       count += this.unpack(t).positions.length;
     }
     require(count === this.count, 'places');

@@ -1,5 +1,5 @@
 // The walkable area of a scene: a `.walk` file (render_core/walk/walk_file.h).
-import { Breaths } from '../base/breaths';
+import { Yields } from '../base/yields';
 import { crc32 } from '../base/crc32';
 import { add, cross, dot, scale, sub, type Vec3 } from '../base/vector';
 import {
@@ -31,7 +31,7 @@ export interface Stand {
   readonly height: number;
 }
 
-/** A floor of a building, or all of a terrain: the places from `low` up to the next storey's. Cells. */
+/** A floor of a building, or all of a terrain: the positions from `low` up to the next storey's. Cells. */
 export interface Storey {
   readonly low: number;
   readonly level: number; // the height of most of its ground
@@ -82,7 +82,7 @@ export function storey_at(map: WalkMap, height: number): number {
 const holds = ({ width, depth }: Tiles, column: number, row: number): boolean =>
   column >= 0 && row >= 0 && column < width && row < depth;
 
-/** The places of a column ascend. Outside of the map there are none. */
+/** The positions of a column ascend. Outside of the map there are none. */
 export function positions_at({ tiles }: WalkMap, column: number, row: number): Uint16Array {
   if (!holds(tiles, column, row)) return no_positions;
   const { first, positions } = tiles.at(tile_at(tiles, column, row));
@@ -105,7 +105,7 @@ export function clear_at(
   return i < 0 ? -1 : positions[i]!;
 }
 
-/** The index of the clear ground within a step of `height` among the places of a column; -1 where there is none. */
+/** The index of the clear ground within a step of `height` among the positions of a column; -1 where there is none. */
 export function clear_in(
   positions: Uint16Array,
   begin: number,
@@ -130,7 +130,7 @@ export interface Block {
   readonly north: number;
 }
 
-/** The parts of a map that have places, of one tile each. */
+/** The parts of a map that have positions, of one tile each. */
 export function* blocks({ tiles }: WalkMap): Generator<Block> {
   const { width, depth } = tiles;
   for (let south = 0; south < depth; south += tile_side)
@@ -144,15 +144,15 @@ export function* blocks({ tiles }: WalkMap): Generator<Block> {
         };
 }
 
-/** The smallest block around the columns with such places; undefined: there are none. */
+/** The smallest block around the columns with such positions; undefined: there are none. */
 export async function block_around(
   map: WalkMap,
   such: (position: number) => boolean,
 ): Promise<Block | undefined> {
   let [west, south, east, north] = [Infinity, Infinity, 0, 0];
-  const breaths = new Breaths();
+  const yields = new Yields();
   for (const block of blocks(map)) {
-    await breaths.take();
+    await yields.if_due();
     if (block.west >= west && block.south >= south && block.east <= east && block.north <= north)
       continue;
     for (let row = block.south; row < block.north; ++row)
@@ -181,7 +181,7 @@ export async function read_walk_file(file: ArrayBuffer): Promise<WalkMap> {
   require(crc32(new Uint8Array(file, 16)) === word(12), 'checksum');
   const [width, depth] = [word(104), word(108)];
   require(width >= 1 && width <= most_side && depth >= 1 && depth <= most_side, 'size');
-  require(word(112) <= most_positions, 'places');
+  require(word(112) <= most_positions, 'positions');
   require(word(116) === tile_side, 'tile side');
   require(word(120) === file.byteLength - header_bytes, 'packed bytes');
   const tiles = new PackedTiles(width, depth, word(112), new Uint8Array(file, header_bytes));

@@ -1,5 +1,5 @@
 // The floor plan of a storey as a picture, in the colours of render_core/walk/plan.cpp.
-import { Breaths } from '../base/breaths';
+import { Yields } from '../base/yields';
 import { height_of, Kind, kind_of } from '../walk/tiles';
 import {
   block_around,
@@ -42,9 +42,9 @@ export async function plan_picture(map: WalkMap, storey: number): Promise<PlanPi
   const cells = Math.ceil(Math.max(east - west, north - south) / most_px);
   const [width, height] = [Math.ceil((east - west) / cells), Math.ceil((north - south) / cells)];
   const rgba = new Uint8ClampedArray(4 * width * height);
-  const breaths = new Breaths();
+  const yields = new Yields();
   for (const block of blocks(map)) {
-    await breaths.take();
+    await yields.if_due();
     for (let row = block.south; row < block.north; ++row)
       for (let column = block.west; column < block.east; ++column) {
         const top = positions_at(map, column, row).findLast(in_storey);

@@ -31,18 +31,18 @@ interface KnownWay extends Ray {
   readonly width: number;
 }
 
-export class ClearWay {
+export class ClearPath {
   ask: AskDistance | undefined;
   private known_: KnownWay[] = [];
   private asks_ = false;
   private checked_: Vec3 | undefined; // the camera may be here
-  private ventured_: Vec3 | undefined; // the camera went here before the answer
+  private moved_unchecked_: Vec3 | undefined; // the camera went here before the answer
   private end_: Vec3 | undefined;
 
   /** The scene is another one. */
   forget(): void {
     this.known_ = [];
-    this.checked_ = this.ventured_ = this.end_ = undefined;
+    this.checked_ = this.moved_unchecked_ = this.end_ = undefined;
   }
 
   /** Whether the camera may go there; undefined: it is not known yet, and is asked. */
@@ -67,8 +67,8 @@ export class ClearWay {
   }
 
   /** The camera has gone there without an answer. */
-  ventured(to: Vec3): void {
-    this.ventured_ = to;
+  moved_unchecked(to: Vec3): void {
+    this.moved_unchecked_ = to;
   }
 
   /** Where the camera goes back to, since something opaque is in between; undefined: nothing is. */
@@ -100,8 +100,8 @@ export class ClearWay {
       if (!passes) return;
       known.unshift({ origin: from, direction, clear, asked: length(ahead), width });
       known.splice(most_known);
-      const along = this.ventured_ && dot(sub(this.ventured_, from), direction);
-      this.ventured_ = undefined;
+      const along = this.moved_unchecked_ && dot(sub(this.moved_unchecked_, from), direction);
+      this.moved_unchecked_ = undefined;
       if (along !== undefined && along > clear - clearance)
         this.end_ = add(from, scale(direction, Math.max(0, clear - clearance)));
     };
