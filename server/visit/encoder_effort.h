@@ -40,9 +40,8 @@ inline constexpr EffortPreset effort_presets[] = {
 
 /// Chooses the effort of all software encoders from the measured headroom. Each change reopens a
 /// stream with an IDR. At most half of the sessions change at once, and then none for a second.
-/// - Threads: with fewer sessions than processors, each picture is cut into slices that are encoded
-///   in parallel. The slice count is rounded up, because frames of different sessions rarely
-///   coincide. One stream at a time is recut, and only when no preset has to change.
+/// - Threads: with fewer sessions than processors, large pictures are cut into two slices that are
+///   encoded in parallel. One stream at a time is recut, and only when no preset has to change.
 /// - Newcomer: it starts with the best preset that leaves three quarters of the processors free.
 ///   Its cost is assumed to equal the others' cost. The margin is wide, because more clients may
 ///   follow and an overload costs all of them frames. A better preset can come later.

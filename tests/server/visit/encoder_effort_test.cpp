@@ -57,29 +57,27 @@ class EffortControlTest : public testing::Test {
   TimePoint now = TimePoint{} + 1h;
 };
 
-TEST_F(EffortControlTest, CutsPicturesWhereSessionsAreFewerThanProcessors) {
-  EXPECT_EQ(control.initial(1, full_hd).threads, 8);
-  EXPECT_EQ(control.initial(2, full_hd).threads, 8);
-  EXPECT_EQ(control.initial(3, full_hd).threads, 4);
+TEST_F(EffortControlTest, LargePicturesAreCutInTwoWhereSessionsAreFewerThanProcessors) {
+  EXPECT_EQ(control.initial(1, full_hd).threads, 2) << "four would starve the VBV";
   EXPECT_EQ(control.initial(8, full_hd).threads, 2);
   EXPECT_EQ(control.initial(9, full_hd).threads, 2) << "rounded up";
   EXPECT_EQ(control.initial(16, full_hd).threads, 1);
-  EXPECT_EQ(control.initial(1, {640, 360}).threads, 2) << "slices do not predict from each other";
-  EXPECT_EQ(control.initial(1, {160, 90}).threads, 1);
-  EXPECT_EQ(control.initial(0, full_hd).threads, 8);
+  EXPECT_EQ(control.initial(0, full_hd).threads, 2);
+  EXPECT_EQ(control.initial(1, {1280, 720}).threads, 1);
+  EXPECT_EQ(control.initial(1, {332, 720}).threads, 1);
 }
 
 TEST_F(EffortControlTest, ThreadsFollowTheNumberOfSessionsOneAtATime) {
   other_cpus = 4.0;  // neither busy nor calm
   add(2, 0.3);
   run(1s);
-  EXPECT_EQ(sessions[0].effort.threads, 8);
-  add(6, 0.3);
-  run(900ms);
   EXPECT_EQ(sessions[0].effort.threads, 2);
-  EXPECT_EQ(sessions[1].effort.threads, 8) << "not both at once: each change is an IDR";
+  add(14, 0.1);
+  run(900ms);
+  EXPECT_EQ(sessions[0].effort.threads, 1);
+  EXPECT_EQ(sessions[1].effort.threads, 2) << "not both at once: each change is an IDR";
   run(10s);
-  for (const auto& session : sessions) EXPECT_EQ(session.effort.threads, 2);
+  for (const auto& session : sessions) EXPECT_EQ(session.effort.threads, 1);
   EXPECT_EQ(run(30s), 0) << "and there it stays";
 }
 
