@@ -11,7 +11,7 @@ usage: deploy/run.sh [SCENE...] [options] [catgs-server options]
 Installs what the build needs, builds the server and the browser client, and serves the scenes.
 Without a SCENE it makes a procedural city of 300,000 Gaussians and a garden, and serves these with tours.
 SCENE is a .ply, .splat, .ksplat, .spz, .sog, .ssog, .glb, .gltf, .lcc, .lcc2 or .tree file, or a folder: SOG,
-streamed SOG, 3D Tiles, or a training output.
+streamed SOG, 3D Tiles, or a training output. Or it is synth:KIND:COUNT, such as synth:city:20000.
 
   --port N     listen on port N (default 8080)
   --lan        also serve other devices in this network: all interfaces, a token, TLS with a
@@ -69,8 +69,12 @@ parse_arguments() {
         fi
         ;;
       *)
-        [[ -e $1 ]] || fail "$EXIT_USAGE" "No such scene: $1"
-        scenes+=("$(realpath -- "$1")")
+        if [[ $1 == synth:* ]]; then
+          scenes+=("$1")
+        else
+          [[ -e $1 ]] || fail "$EXIT_USAGE" "No such scene: $1"
+          scenes+=("$(realpath -- "$1")")
+        fi
         ;;
     esac
     shift

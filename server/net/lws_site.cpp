@@ -36,8 +36,9 @@ std::string peer_address_of(lws* wsi) {
 /// A proxy reports how the client reached it.
 bool came_by_tls(lws* wsi) {
   if (lws_is_ssl(wsi) != 0) return true;
-  return site_of(wsi).proxies.is_proxy(peer_address_of(wsi)) &&
-         custom_header(wsi, "x-forwarded-proto:") == "https";
+  if (!site_of(wsi).proxies.is_proxy(peer_address_of(wsi))) return false;
+  const std::string scheme = custom_header(wsi, "x-forwarded-proto:");
+  return scheme == "https" || scheme == "wss";  // Traefik's name for it on websockets
 }
 
 /// Refuses a request that changes something, if another site's page sent it. `what`: for the log.

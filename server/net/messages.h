@@ -277,6 +277,7 @@ struct Lead {
   bool may_ping = false;             // followers may
   bool elsewhere = false;            // of ended: the leader is in another scene
   Show shown{};                      // by the leader
+  std::string scene_pass{};          // to spectators: in place of the welcome's
 };
 
 struct Pinged {

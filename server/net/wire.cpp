@@ -145,6 +145,7 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   message.set_company(static_cast<std::uint32_t>(lead.participants));
   message.set_may_ping(lead.may_ping);
   message.set_elsewhere(lead.elsewhere);
+  message.set_scene_pass(lead.scene_pass);
   if (lead.shown != Show{}) {
     auto& shown = *message.mutable_shown();
     shown.set_tour(lead.shown.tour);

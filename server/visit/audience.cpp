@@ -112,8 +112,10 @@ bool Audience::wants_idr(TimePoint now) const {
          std::ranges::any_of(spectators_, &Spectator::waits_for_idr);
 }
 
-void Audience::keep_talking(TimePoint now) {
-  if (const auto lead = tour_.news(spectators_.size(), !visitor_, now)) tell(*lead, now);
+void Audience::keep_talking(
+    TimePoint now, const std::function<std::string(const std::string& scene_id)>& scene_pass) {
+  const auto pass = [&] { return scene_pass(scene_id_); };
+  if (const auto lead = tour_.news(spectators_.size(), !visitor_, now, pass)) tell(*lead, now);
   if (last_said_ && now - *last_said_ < speak_at_least_every) return;
   tell_spectators(heartbeat_at(now), now);
 }

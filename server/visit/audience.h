@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -63,8 +64,9 @@ class Audience {
   /// sent a second or more ago.
   [[nodiscard]] bool wants_idr(TimePoint now) const;
   /// Sends everybody what is new about the tour, and spectators a heartbeat after almost a
-  /// second of silence.
-  void keep_talking(TimePoint now);
+  /// second of silence. `scene_pass`: signs a new pass of spectators to a scene.
+  void keep_talking(TimePoint now,
+                    const std::function<std::string(const std::string& scene_id)>& scene_pass);
   /// Ends the tour and closes all spectators' connections. `elsewhere`: the visitor is in
   /// another scene.
   void end_tour(bool elsewhere = false);

@@ -296,7 +296,7 @@ void Session::on_tick(TimePoint now, int sessions) {
                    visit_.statistics().bytes_sent(), now, visitor_.link_id);
   else
     tally_.off_show();
-  audience_.keep_talking(now);
+  audience_.keep_talking(now, [this](const auto& id) { return scene_pass(around_, visitor_, id); });
   if (audience_.wants_idr(now)) visit_.stream().idr().request();
 }
 
@@ -315,6 +315,12 @@ void Session::account_for(const FrameResult& result, TimePoint now) {
   const glm::dvec2 size_px = ticket.size_px, moving_px = visit_.stream().plan().moving().size_px;
   usage_.frame_ended(ticket, visit_.stream().device() ? device_s : 0.0, now,
                      size_px.x * size_px.y / (moving_px.x * moving_px.y));
+}
+
+std::string scene_pass(const VisitContext& around, const Visitor& host,
+                       const std::string& scene_id) {
+  return around.tokens.scene_pass(scene_id, around.authorize(host.token),
+                                  around.options.wall_clock_s());
 }
 
 std::shared_ptr<Session> find_session(const SessionList& sessions, std::string_view session_id) {

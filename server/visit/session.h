@@ -124,6 +124,10 @@ class Session final : public VisitHost, public std::enable_shared_from_this<Sess
   RequestLimits limits_;
 };
 
+/// A pass of the host's spectators to the tours and media of the scene, by the host's token.
+std::string scene_pass(const VisitContext& around, const Visitor& host,
+                       const std::string& scene_id);
+
 /// Returns null if no session has this id.
 std::shared_ptr<Session> find_session(const SessionList& sessions, std::string_view session_id);
 

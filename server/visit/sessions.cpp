@@ -204,9 +204,7 @@ void Sessions::watch(const std::shared_ptr<ClientConnection>& connection, Sessio
   connection->watch(host);
   Welcome welcome = welcome_to(visit.stream(), host);
   welcome.may_leave = permit.allows(welcome.scene.scene_id, Use::own_session);
-  welcome.scene_pass =
-      around_.tokens.scene_pass(welcome.scene.scene_id, around_.authorize(host.visitor().token),
-                                around_.options.wall_clock_s());
+  welcome.scene_pass = scene_pass(around_, host.visitor(), welcome.scene.scene_id);
   audience.add(connection, std::move(welcome), permit.link_id);
   {
     const std::string address = connection->connection().peer_address();

@@ -14,6 +14,8 @@ using namespace std::chrono_literals;
 // Enough for a smooth way between two of them. Followers draw at their own rate.
 constexpr auto between_cameras = 33ms;
 constexpr auto between_positions = 500ms;
+// A quarter of their lifetime: a slow connection may drop a Lead for a newer one.
+constexpr auto between_passes = 1h;
 // From all participants. Each may send two a second (Session).
 constexpr double pings_per_second = 10.0;
 
@@ -26,7 +28,7 @@ bool same_but_for_camera(const Lead& a, const Lead& b) {
 
 void SharedTour::begin(const Present& settings, TimePoint now) {
   if (!since_) {
-    since_ = now;
+    since_ = passes_renewed_ = now;
     pings_.emplace(pings_per_second, pings_per_second, now);
   }
   settings_ = settings;
@@ -77,15 +79,21 @@ void SharedTour::moved(const PoseSample& camera, TimePoint now) {
   if (now >= next_camera_ - (stops ? between_cameras : 0ms)) tell_camera(now);
 }
 
-std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoint now) {
+std::optional<Lead> SharedTour::news(std::size_t spectators, bool away, TimePoint now,
+                                     const std::function<std::string()>& scene_pass) {
   if (!since_) return std::nullopt;
-  const Lead now_told = lead(away ? LeadState::away : LeadState::leads, spectators + followers());
-  if (told_ && same_but_for_camera(*told_, now_told)) {
+  Lead now_told = lead(away ? LeadState::away : LeadState::leads, spectators + followers());
+  const bool renews_passes = now - passes_renewed_ >= between_passes;
+  if (told_ && same_but_for_camera(*told_, now_told) && !renews_passes) {
     if (camera_is_new_) tell_camera(now);
     return std::nullopt;
   }
   told_ = now_told;
   tell_camera(now);
+  if (renews_passes) {
+    passes_renewed_ = now;
+    now_told.scene_pass = scene_pass();
+  }
   return now_told;
 }
 

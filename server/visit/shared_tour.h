@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,8 +36,9 @@ class SharedTour {
   /// it.
   void show(const Show& shown) { shown_ = shown; }
   /// Call it at every tick. Tells the followers what is new, and returns it for all others;
-  /// nothing: all know it.
-  std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now);
+  /// nothing: all know it. Once an hour it comes with a new pass for spectators.
+  std::optional<Lead> news(std::size_t spectators, bool away, TimePoint now,
+                           const std::function<std::string()>& scene_pass);
   /// The visit is in another scene now, where its camera has not been yet.
   void forget_camera() {
     camera_.reset();
@@ -62,6 +64,7 @@ class SharedTour {
   void tell_camera(TimePoint now);
 
   std::optional<TimePoint> since_;
+  TimePoint passes_renewed_{};
   Present settings_;
   std::optional<Lead> told_;
   std::vector<std::weak_ptr<ClientConnection>> followers_;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Runs a catgs-server behind the proxy configurations of deploy/proxies, with the proxy's own login.
+"""Runs a catgs-server behind the proxy configurations of deploy, with the proxy's own login where they have one.
 
-  proxies.py nginx|caddy SERVER    SERVER: catgs-server
+  proxies.py nginx|caddy|haproxy SERVER    SERVER: catgs-server
 
 Exit status: 0 good, 1 findings (one per line), 77 the proxy or openssl is not installed.
 """
@@ -20,7 +20,8 @@ import tempfile
 
 from haproxy_crowd import free_port, wait_for_port
 
-PROXIES = pathlib.Path(__file__).resolve().parents[2] / "deploy/proxies"
+DEPLOY = pathlib.Path(__file__).resolve().parents[2] / "deploy"
+PROXIES = DEPLOY / "proxies"
 TOKEN = "a-secret-of-more-than-sixteen-bytes"
 LOGIN = {"Authorization": "Basic " + base64.b64encode(b"visitor:guest").decode()}
 EXIT_SKIPPED = 77
@@ -53,6 +54,16 @@ def caddy_command(folder, port, server_port):
     return ["caddy", "run", "--config", str(config), "--adapter", "caddyfile"]
 
 
+def haproxy_command(folder, port, server_port):
+    text = re.sub(r"^frontend stats[\s\S]*|^ +(bind :80|server gpu2 .*)$", "", (DEPLOY / "haproxy/haproxy.cfg").read_text(), flags=re.M)
+    (folder / "pem").write_text((folder / "certificate").read_text() + (folder / "key").read_text())
+    text = text.replace("/etc/haproxy/certs/", f"{folder}/pem").replace("bind :443", f"bind 127.0.0.1:{port}")
+    config = folder / "haproxy.cfg"
+    text = text.replace("maxconn 20000", "maxconn 200").replace("10.0.0.11:8080", f"127.0.0.1:{server_port}")
+    config.write_text(text)
+    return ["haproxy", "-db", "-f", str(config)]
+
+
 def ask(port, path, headers):
     """The status line of the answer, and what follows it."""
     request = f"GET {path} HTTP/1.1\r\nHost: localhost:{port}\r\n" + "".join(f"{name}: {value}\r\n" for name, value in headers.items())
@@ -66,11 +77,11 @@ def ask(port, path, headers):
     return answer.decode(errors="replace").partition("\r\n")
 
 
-def findings_of(port):
+def findings_of(port, asks_for_login):
     websocket = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Protocol": "catgs.v1",
                  "Sec-WebSocket-Key": base64.b64encode(b"0123456789abcdef").decode(), "Origin": f"https://localhost:{port}"}
     cases = (
-        ("the page without the proxy's login", "/", {}, 401),
+        ("the page without the proxy's login", "/", {}, 401 if asks_for_login else 200),
         ("the page", "/", LOGIN, 200),
         ("large cookies", "/", LOGIN | {"Cookie": "a=" + 12_000 * "c"}, 200),
         ("scenes without a token", "/api/scenes", LOGIN, 401),
@@ -99,15 +110,15 @@ def main():
         server_port, port = free_port(), free_port()
         command = [server, "--scene", "synth:city:1000", "--port", str(server_port), "--admin-bind", "off", "--renderer", "cpu",
                    "--token-file", str(folder / "tokens"), "--trusted-proxy", "127.0.0.1"]
-        proxy = {"nginx": nginx_command, "caddy": caddy_command}[name](folder, port, server_port)
+        commands = {"nginx": nginx_command, "caddy": caddy_command, "haproxy": haproxy_command}
+        proxy = commands[name](folder, port, server_port)
         with open(folder / "output", "wb") as output:
-            for program in (command, proxy):
-                process = programs.enter_context(subprocess.Popen(program, stdout=output, stderr=output))
-                programs.callback(process.terminate)
             try:
-                wait_for_port(server_port)
-                wait_for_port(port)
-                findings = list(findings_of(port))
+                for program, its_port in ((command, server_port), (proxy, port)):
+                    process = programs.enter_context(subprocess.Popen(program, stdout=output, stderr=output))
+                    programs.callback(process.terminate)
+                    wait_for_port(its_port)  # HAProxy checks the server at once
+                findings = list(findings_of(port, name != "haproxy"))
             except (OSError, RuntimeError) as error:
                 findings = [str(error)]
         if findings:

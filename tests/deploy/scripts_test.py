@@ -310,6 +310,14 @@ class Serving(Machine):
                                  r" +http://127\.0\.0\.1:7/\?scene=my%20room%20%232\n")
         self.assertNotIn("?scene=", self.serve(scenes[0], *self.options()).stdout)
 
+    def test_a_procedural_scene_is_no_file(self):
+        result = self.serve("synth:city:20000", *self.options())
+        self.assertIn("stop      Ctrl-C", result.stdout, result.stderr)
+        self.assertIn(" --scene synth:city:20000 ", self.server_calls()[-1])
+        result = self.serve("city:20000", *self.options())
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("No such scene: city:20000", result.stderr)
+
     def test_links_are_told_where_the_address_needs_a_token(self):
         scene = self.scene("my room.ply")
         link = (f"  link      {self.bin}/catgs-server token --token-key-file my\\ key "

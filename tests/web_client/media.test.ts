@@ -2,6 +2,7 @@
 import { readFileSync } from 'node:fs';
 import { describe, expect, it } from 'vitest';
 import type { Vec3 } from '#client/base/vector';
+import { MediaAddresses } from '#client/media/addresses';
 import { free_name, other_format } from '#client/media/media_folder';
 import { Sounds, type Playable } from '#client/media/sounds';
 import * as limits from '#client/tour/limits';
@@ -280,4 +281,13 @@ it('names the formats of cameras that tours cannot show', async () => {
   expect(await format_of('\0\0\0\x14ftypqt  ')).toEqual({ format: 'QuickTime', instead: 'MP4' });
   for (const head of ['\0\0\0\x18ftypisom', '\x89PNG', '', 'heic'])
     expect(await format_of(head)).toBeUndefined();
+});
+
+it('addresses of media carry the newest pass of a spectator', async () => {
+  const token = { value: '', pass: 'first' };
+  const addresses = new MediaAddresses('https://tours.example/', token, 'hall');
+  const pass = async () => new URL(await addresses.of('door.jpg')).searchParams.get('pass');
+  expect(await pass()).toBe('first');
+  token.pass = 'second';
+  expect(await pass()).toBe('second');
 });

@@ -101,7 +101,9 @@ TEST(ServerAccess, AnswersNoForeignNameWhereNoTokenIsAskedFor) {
   }
   for (const char* host : {"localhost", "192.0.2.1:8080", "museum-pc", "museum-pc.local:8080"})
     EXPECT_EQ(status(open.port(), host), 200) << host;
-  EXPECT_EQ(status(open.port(), "tours.example", "https"), 200) << "its certificate was looked at";
+  for (const char* scheme : {"https", "wss"})
+    EXPECT_EQ(status(open.port(), "tours.example", scheme), 200) << "its certificate was looked at";
+  EXPECT_EQ(status(open.port(), "tours.example", "ws"), 403);
   const WireClient::Options rebound{"http://evil.example:8080", "catgs.v1", "evil.example:8080"};
   EXPECT_THROW(WireClient(open.port(), rebound), boost::system::system_error);
 

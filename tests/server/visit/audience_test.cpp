@@ -1,5 +1,7 @@
 #include "server/visit/audience.h"
 
+#include <fmt/format.h>
+
 #include "tests/server/visit/sessions_fixture.h"
 
 namespace catgs::test {
@@ -20,6 +22,13 @@ class AudienceTest : public testing::Test {
     audience.send(outgoing, now);
   }
 
+  void keep_talking(TimePoint at) {
+    audience.keep_talking(at, [this](const std::string& scene_id) {
+      return fmt::format("pass {} to {}", ++passes, scene_id);
+    });
+  }
+
+  int passes = 0;  // signed
   TimePoint now = TimePoint{} + 1h;
   boost::asio::io_context io;
   Metrics metrics;
@@ -112,9 +121,26 @@ TEST_F(AudienceTest, ALostDecoderAsksForItself) {
 
 TEST_F(AudienceTest, IsNeverSilentForLong) {
   const auto spectator = join();
-  for (auto waited = 0ms; waited < 10s; waited += 250ms) audience.keep_talking(now + waited);
+  for (auto waited = 0ms; waited < 10s; waited += 250ms) keep_talking(now + waited);
   EXPECT_GE(spectator->messages, 1 + 10);
   EXPECT_LE(spectator->messages, 1 + 14);
+}
+
+TEST_F(AudienceTest, SpectatorsOfALongTourGetANewPassEachHour) {
+  Welcome welcome;
+  welcome.scene.scene_id = "hall";
+  audience.send(welcome, now);
+  audience.tour().begin({true, "Ada"}, now);
+  const auto spectator = join();
+  keep_talking(now);
+  EXPECT_EQ(spectator->lead->scene_pass(), "");
+  keep_talking(now + 59min);
+  EXPECT_EQ(passes, 0);
+  for (auto later = 60min; later < 180min; later += 5min) keep_talking(now + later);
+  EXPECT_EQ(passes, 2);
+  EXPECT_EQ(spectator->lead->scene_pass(), "pass 2 to hall");
+  EXPECT_EQ(spectator->lead->name(), "Ada") << "the message is whole";
+  EXPECT_EQ(spectator->lead->company(), 1u);
 }
 
 TEST_F(AudienceTest, EndsWithTheSession) {

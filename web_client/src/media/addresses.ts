@@ -1,4 +1,5 @@
 import { ask_server, scene_path, server_address } from '../base/server';
+import type { AccessToken } from '../session/token';
 import { is_foreign } from '../tour/media';
 
 const renew_after_ms = 3600_000; // the server's signatures are valid for four hours
@@ -12,9 +13,8 @@ export class MediaAddresses {
 
   constructor(
     private readonly page_url_: string,
-    private readonly token_: string,
+    private readonly token_: Pick<AccessToken, 'value' | 'pass'>,
     private readonly scene_id_: string,
-    private readonly pass_: string,
   ) {}
 
   async of(src: string): Promise<string> {
@@ -23,7 +23,7 @@ export class MediaAddresses {
       this.page_url_,
       scene_path(this.scene_id_, `media/${encodeURIComponent(src)}`),
     );
-    const pass = this.pass_ || (this.token_ && (await this.signature()));
+    const pass = this.token_.pass || (this.token_.value && (await this.signature()));
     if (pass) address.searchParams.set('pass', pass);
     return address.href;
   }
@@ -40,7 +40,7 @@ export class MediaAddresses {
     try {
       const response = await ask_server(
         this.page_url_,
-        this.token_,
+        this.token_.value,
         scene_path(this.scene_id_, 'media-pass'),
       );
       if (response.ok) return await response.text();

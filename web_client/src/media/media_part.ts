@@ -17,7 +17,7 @@ export class MediaPart {
   private readonly narrator_: Narrator;
   private readonly media_: StopMedia;
   private addresses_: MediaAddresses;
-  private addresses_for_ = ''; // scene, token and pass
+  private addresses_for_ = ''; // scene, token and whether there is a pass
   private tour_: Tour | undefined;
   private stop_: Stop | undefined;
   private playing_ = false;
@@ -27,7 +27,7 @@ export class MediaPart {
     private readonly token_: Pick<AccessToken, 'value' | 'pass'>,
     enlarged: () => void,
   ) {
-    this.addresses_ = new MediaAddresses(location.href, '', '', '');
+    this.addresses_ = new MediaAddresses(location.href, token_, '');
     const voice = make('audio', { preload: 'auto' });
     this.sounds_ = new Sounds({
       voice,
@@ -50,9 +50,9 @@ export class MediaPart {
   show_tours(scene_id: string, tours: readonly Tour[]): void {
     const { value: token, pass } = this.token_;
     // Sounds begin again at another address, so an author's edit does not change it.
-    const addresses_for = `${scene_id} ${token} ${pass}`;
+    const addresses_for = `${scene_id} ${token} ${pass !== ''}`;
     if (this.addresses_for_ !== addresses_for)
-      this.addresses_ = new MediaAddresses(location.href, token, scene_id, pass);
+      this.addresses_ = new MediaAddresses(location.href, this.token_, scene_id);
     this.addresses_for_ = addresses_for;
     const sounds = ({ sound, stops }: Tour): boolean =>
       sound !== undefined ||

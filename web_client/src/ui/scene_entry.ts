@@ -41,6 +41,10 @@ export class SceneEntry {
     page_.worker.on('welcome', ({ welcome: { watching, scene, scenePass } }) => {
       if (watching && scene && scenePass) void this.watch(scene.sceneId, scenePass);
     });
+    page_.worker.on('lead', ({ lead: { scenePass } }) => {
+      // Visitors who do not watch have none, and need none.
+      if (scenePass && page_.token.pass) page_.token.pass = scenePass;
+    });
     window.addEventListener('hashchange', () => {
       if (travel.leads_elsewhere) return;
       const shared = read_shared(location.href);
