@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { load_part, part_missing } from '#client/base/load_part';
-import { load_author_page } from '#client/ui/mount_tours';
+import { load_author_page } from '#client/author_editor';
 
 describe('a part of the page', () => {
   let told: boolean[];

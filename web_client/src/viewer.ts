@@ -1,4 +1,5 @@
 // Makes the parts of the page and starts the worker. Parts listen to each other without passing through here.
+import { make_editor } from './author_editor';
 import { TourMedia } from './media/tour_media';
 import { make_page_parts } from './page/parts';
 import type { AccessToken } from './session/token';
@@ -26,7 +27,11 @@ export function mount_viewer(
   const { view, worker, navigation, clock } = parts;
   const stream_size = new StreamSize(view, worker);
   const media = new TourMedia(token);
-  const { tours, measures, set_scale } = mount_tours(parts, media, is_author);
+  const { tours, measures, set_scale } = mount_tours(
+    parts,
+    media,
+    is_author ? make_editor : undefined,
+  );
   media.enlarged.listen(() => tours.player.pause());
   mount_panels(parts, stream_size, measures, set_scale);
   const walkable_area = new WalkableArea({

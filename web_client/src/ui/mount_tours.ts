@@ -1,5 +1,4 @@
 import type { TourEditor } from '../author/tour_editor';
-import { load_part } from '../base/load_part';
 import type { PageParts } from '../page/parts';
 import { MeasureList } from '../tour/measure_list';
 import { EmbedApi } from './embed';
@@ -10,24 +9,19 @@ import { SceneTours, type TourMediaPart } from './scene_tours';
 import { SharePanel } from './share_panel';
 import { SharedViews } from './shared_views';
 
-/** Asks for the editor until it comes. The author is told while it is missing (load_part). */
-export async function load_author_page(
-  load = () => import('../author_page'),
-): Promise<typeof import('../author_page')> {
-  for (;;) {
-    try {
-      return await load_part(load);
-    } catch (error) {
-      console.warn('the editor is not there yet', error); // the server is away
-    }
-  }
-}
+/** Of authors: makes the editor, which may load for long. */
+export type MakeEditor = (
+  parts: PageParts,
+  tours: SceneTours,
+  measures: MeasureList,
+  list_scenes: PortalScenes['list'],
+) => Promise<TourEditor>;
 
 /** Tours, links to views, portals between scenes, the author's editor, and the page around this one. */
 export function mount_tours(
   parts: PageParts,
   media: TourMediaPart,
-  is_author: boolean,
+  make_editor: MakeEditor | undefined,
 ): {
   readonly tours: SceneTours;
   readonly measures: MeasureList;
@@ -40,13 +34,7 @@ export function mount_tours(
   const views = new SharedViews(parts, tours.player);
   const travel = new PortalTravel(parts, () => views.present);
   tours.portal_taken.listen(({ scene_id, portal }) => travel.enter(portal, scene_id));
-  const list_scenes = (): ReturnType<PortalScenes['list']> => scenes.list();
-  const editor = is_author
-    ? load_author_page().then(
-        ({ TourEditor, AuthorMedia }) =>
-          new TourEditor(parts, tours, measures, list_scenes, new AuthorMedia()),
-      )
-    : undefined;
+  const editor = make_editor?.(parts, tours, measures, () => scenes.list());
   new SharePanel(parts, measures, (shared) => views.address(shared));
   const { player } = tours;
   const embed = new EmbedApi({ player, navigation, put: (eye) => views.put(eye) });
