@@ -93,8 +93,27 @@ PackedUnits units_for(const GaussianCloud& cloud, std::span<const std::uint32_t>
     const auto of_one = largest_sh(cloud, members[j]);
     for (std::size_t d = 0; d < max_sh_degree; ++d) largest[d][j] = of_one[d];
   }
+  // Degrees share a Gaussian's octave. Were one's unit much smaller than the others', a Gaussian
+  // with more of that degree than is usual would have coarse harmonics in all of them.
+  constexpr float least_of_others = 0.25f;
+  std::array<float, max_sh_degree> usual;
   for (std::size_t d = 0; d < max_sh_degree; ++d)
-    units.sh[d] = typical(std::span(largest[d]).first(members.size())) / sh_levels * sh_unit_scale;
+    usual[d] = typical(std::span(largest[d]).first(members.size()));
+  const float least = least_of_others * *std::ranges::max_element(usual);
+  float times = 0.0f;  // of the usual one
+  for (std::size_t d = 0; d < max_sh_degree; ++d) {
+    usual[d] = std::max(usual[d], least);
+    const float most = *std::max_element(largest[d].begin(), largest[d].begin() + members.size());
+    if (most > 0.0f) times = std::max(times, most / usual[d]);
+  }
+  // The highest octave holds the largest of the cluster. Harmonics are bounded (sanitize), so those
+  // of the lowest octave are still finer than a pixel's levels.
+  constexpr int highest_octave = least_sh_octave + static_cast<int>(sh_octave_mask);
+  const int raised =
+      times > 0.0f ? std::max(0, static_cast<int>(std::ceil(std::log2(times))) - highest_octave)
+                   : 0;
+  for (std::size_t d = 0; d < max_sh_degree; ++d)
+    units.sh[d] = std::ldexp(usual[d] / sh_levels * sh_unit_scale, raised);
   return units;
 }
 

@@ -144,10 +144,28 @@ TEST(PackedGaussian, ExtremeHarmonicsSpoilTheirOwnGaussianAlone) {
             glm::vec3(value);
       EXPECT_LT(sh_error(cloud, wild), 1.05 * before);
       const float kept = PackedScene(cloud)[wild].sh.back();
-      EXPECT_EQ(kept > 0.0f, value > 0.0f);
-      EXPECT_LE(std::abs(kept), 1.01f * std::abs(value) + 0.01f);
-      EXPECT_GE(std::abs(kept), std::min(0.99f * std::abs(value), 30.0f) - 0.01f);
+      EXPECT_NEAR(kept, value, 0.01f * std::abs(value) + 0.01f);
     }
+}
+
+TEST(PackedGaussian, FaintHarmonicsOfManyDoNotClampThoseOfOthers) {
+  struct Case {
+    float faint, strong;  // in the degrees from the third on
+    float below;          // in the first and second degree
+    std::uint32_t strong_ones;
+  };
+  for (const Case& c : {Case{1e-5f, 0.1f, 1e-5f, 115}, Case{1e-4f, 0.4f, 1e-4f, 3},
+                        Case{2e-4f, 0.1f, 0.1f, 25}, Case{0.0f, 0.1f, 0.1f, 25}}) {
+    SCOPED_TRACE(testing::Message() << c.faint << ", " << c.strong_ones << " of " << c.strong);
+    GaussianCloud cloud = catgs::test::random_cloud(256, 3, 8);
+    const auto count = static_cast<std::size_t>(cloud.sh_count());
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      for (std::size_t k = 1; k < count; ++k)
+        cloud.sh[i * count + k] = glm::vec3(i < c.strong_ones ? c.strong
+                                            : k < 9           ? c.below
+                                                              : c.faint);
+    EXPECT_LT(sh_error(cloud, 256) / std::sqrt(256.0 * 45.0), 1e-3);
+  }
 }
 
 TEST(PackedGaussian, FaintOnesStayFaint) {
