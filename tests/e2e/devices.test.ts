@@ -152,6 +152,17 @@ describe('a phone', () => {
     },
   ];
 
+  it('leaves no button grey that a finger has touched', async () => {
+    const server = await start_fake_server(stream, { tours });
+    const { page } = await open(server.url, windows.phone);
+    const next = page.getByRole('button', { name: 'Next stop' });
+    await next.tap();
+    await page.getByText('1 of 2').waitFor();
+    expect(await next.evaluate((button) => getComputedStyle(button).backgroundColor)).toBe(
+      'rgba(0, 0, 0, 0)',
+    );
+  });
+
   it.each([
     [390, 844, '#stop=1'],
     [360, 640, '#stop=2'],
