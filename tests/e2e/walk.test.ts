@@ -111,6 +111,25 @@ describe('a visitor who walks', () => {
   });
 });
 
+describe('a visitor who stands where no floor is', () => {
+  it('is told so until they walk', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    await page.locator('#button-plan').waitFor({ state: 'visible' });
+    await page.evaluate(() => (location.hash = 'at=0,-40,-90,0,0,0,1,60'));
+    await settle(page);
+    await page.locator('#view').focus();
+    const notice = page.getByText('There is no floor here.');
+    for (let k = 0; k < 3 && !(await notice.isVisible()); ++k) {
+      await page.keyboard.press('KeyM');
+      await page.waitForTimeout(500);
+    }
+    await notice.waitFor();
+    await page.mouse.click(640, 600);
+    await expect.poll(async () => height(await pose_of(page))).toBeLessThan(39);
+    await notice.waitFor({ state: 'hidden', timeout: 2000 }); // it would go by itself after 10 s
+  });
+});
+
 describe('a visit that begins inside', () => {
   const servers: Record<string, RunningServer> = {};
   beforeAll(async () => {
