@@ -14,11 +14,30 @@ const unused_enums = (code: string): string =>
     'export const $1 = /*@__PURE__*/ (function ($1) {$2 return $1; })({});',
   );
 
+// Protobuf starts from a description of descriptions. The wire uses none of these parts of it.
+const unused_parts = ['extensionRange', 'defaultValue'];
+const unused_messages =
+  /^((File|Service|Method|Oneof|Enum|EnumValue|ExtensionRange)Options|(Source|Generated)CodeInfo|FeatureSetDefaults|UninterpretedOption)$/;
+const without_unused = (code: string): string =>
+  code.replace(/ boot\((\{.*\})\);/, (_, description: string) => {
+    function used(this: { name?: string }, key: string, value: { packed?: boolean }): unknown {
+      const is_unused =
+        unused_parts.includes(key) ||
+        (key === 'options' && !value.packed) ||
+        (['field', 'nestedType', 'enumType'].includes(key) &&
+          unused_messages.test(this.name ?? ''));
+      return is_unused ? undefined : value;
+    }
+    return ` boot(${JSON.stringify(JSON.parse(description), used)});`;
+  });
+
 /** Makes files smaller than minifying does. */
 const smaller: Plugin = {
   name: 'smaller',
   transform: (code, file) =>
-    file.includes('@bufbuild/protobuf') ? { code: unused_enums(code), map: null } : null,
+    file.includes('@bufbuild/protobuf')
+      ? { code: without_unused(unused_enums(code)), map: null }
+      : null,
   // Names of private members end so, and no others do.
   renderChunk: (code, { fileName }) =>
     transformWithEsbuild(code, fileName, { mangleProps: /[^_]_$/, loader: 'js' }),

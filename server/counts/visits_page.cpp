@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -66,11 +67,18 @@ double per_visit(double value, std::uint64_t visits) {
   return visits == 0 ? 0.0 : value / static_cast<double>(visits);
 }
 
+/// "1:05": people read no "1.083".
+std::string hours_and_minutes(double seconds) {
+  const auto minutes = std::llround(seconds / 60.0);
+  return fmt::format("{}:{:02}", minutes / 60, minutes % 60);
+}
+
 Json scene_row(Json name, const SceneCounts& counts) {
+  const auto tenths = [](double value) { return std::round(10.0 * value) / 10.0; };
   const double hours = counts.seconds / 3600.0;
-  Json row = {std::move(name), counts.visits, hours,
-              per_visit(counts.seconds / 60.0, counts.visits),
-              hours > 0.0 ? 1e-6 * static_cast<double>(counts.bytes) / hours : 0.0};
+  Json row = {std::move(name), counts.visits, hours_and_minutes(counts.seconds),
+              tenths(per_visit(counts.seconds / 60.0, counts.visits)),
+              tenths(hours > 0.0 ? 1e-6 * static_cast<double>(counts.bytes) / hours : 0.0)};
   for (std::size_t i = 1; i <= device_kinds; ++i)  // unknown devices last
     row.push_back(counts.devices[i % device_kinds]);
   return row;

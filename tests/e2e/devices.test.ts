@@ -138,6 +138,79 @@ describe('a phone', () => {
     expect(small).toEqual([]);
     await keep_screenshot(page, 'phone-fields');
   });
+
+  const tours = [
+    {
+      title: 'A walk',
+      stops: ['Short.', 'A long story. '.repeat(30)].map((caption) => ({
+        title: 'The gate',
+        caption,
+        position: [0, 0, -5],
+        look_at: [0, 0, 0],
+        marker: [0, 1.1, -2],
+      })),
+    },
+  ];
+
+  it('leaves no button grey that a finger has touched', async () => {
+    const server = await start_fake_server(stream, { tours });
+    const { page } = await open(server.url, windows.phone);
+    const next = page.getByRole('button', { name: 'Next stop' });
+    await next.tap();
+    await page.getByText('1 of 2').waitFor();
+    expect(await next.evaluate((button) => getComputedStyle(button).backgroundColor)).toBe(
+      'rgba(0, 0, 0, 0)',
+    );
+  });
+
+  it.each([
+    [390, 844, '#stop=1'],
+    [360, 640, '#stop=2'],
+    [740, 360, '#stop=2'],
+    [390, 420, '?ui=0#stop=1'],
+    [430, 420, '?ui=0#stop=2'],
+  ])(
+    'of %i x %i sees the hotspot and the title beside the card: %s',
+    async (width, height, rest) => {
+      const server = await start_fake_server(
+        (peer, body) => {
+          stream_of(jpeg, { title: 'A very long title of the demo city', credits: 'Ada Lovelace' })(
+            peer,
+            body,
+          );
+          if (body.case === 'markers')
+            peer.say({ case: 'hiddenMarkers', value: { id: body.value.id, indices: [0, 1] } });
+        },
+        { tours },
+      );
+      const viewport = { width, height };
+      const { page, errors } = await open(`${server.url}${rest}`, { ...windows.phone, viewport });
+      const hotspot = page.locator('.hotspot[aria-current]');
+      await expect(hotspot.getAttribute('class')).resolves.toContain('behind');
+      const card = page.locator('#tour');
+      for (const lines of ['', 'A line. '.repeat(30)]) {
+        await card.locator('h2').evaluate((title, more) => title.append(more), lines); // the card grows
+        await expect
+          .poll(async () => {
+            const [spot, covered, title] = (await Promise.all(
+              [hotspot, card, page.locator('#scene-title')].map((element) => element.boundingBox()),
+            )) as { x: number; y: number; width: number; height: number }[];
+            const apart = (a: typeof spot, b: typeof spot): boolean =>
+              a!.x + a!.width <= b!.x ||
+              b!.x + b!.width <= a!.x ||
+              a!.y + a!.height <= b!.y ||
+              b!.y + b!.height <= a!.y;
+            return [apart(spot, covered), apart(title, covered)];
+          })
+          .toEqual([true, true]);
+      }
+      expect(
+        await hotspot.evaluate((spot) => spot.checkVisibility({ visibilityProperty: true })),
+      ).toBe(true);
+      await keep_screenshot(page, `hotspot-beside-card-${width}x${height}`);
+      expect(errors).toEqual([]);
+    },
+  );
 });
 
 describe('an error', () => {

@@ -71,6 +71,29 @@ const voice = (page: Page): Promise<Heard> =>
   }));
 
 describe('an author', () => {
+  it('keeps two files that are sent at once, each in its field', async () => {
+    const { page } = await open(link('author', '?author'), windows['desktop']);
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByText('Pictures, films, voice').click();
+    const release: (() => void)[] = [];
+    await page.route('**/media/both*', async (route) => {
+      await new Promise<void>((resolve) => release.push(resolve));
+      await route.continue();
+    });
+    for (const label of ['Add a picture, film or sound', 'Voice']) {
+      const sent = release.length;
+      await page
+        .locator(`input[type=file][aria-label="Upload: ${label}"]`)
+        .setInputFiles({ name: 'both.wav', buffer: tone(1), mimeType: '' });
+      await expect.poll(() => release.length).toBe(sent + 1);
+    }
+    release[0]!();
+    await page.getByLabel('Captions of both.wav').first().waitFor(); // its fields are there, all are new
+    release[1]!();
+    const voice = page.getByLabel('Voice', { exact: true });
+    await expect.poll(() => voice.inputValue()).toBe('both-2.wav');
+  });
+
   it('adds a picture, a film, a voice and a sound', async () => {
     const { page, errors } = await open(link('author', '?author'), windows['desktop']);
     await page.getByRole('button', { name: 'Add a stop here' }).click();

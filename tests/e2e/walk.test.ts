@@ -111,6 +111,25 @@ describe('a visitor who walks', () => {
   });
 });
 
+describe('a visitor who stands where no floor is', () => {
+  it('is told so until they walk', async () => {
+    const { page } = await open(server.url, windows.desktop);
+    await page.locator('#button-plan').waitFor({ state: 'visible' });
+    await page.evaluate(() => (location.hash = 'at=0,-40,-90,0,0,0,1,60'));
+    await settle(page);
+    await page.locator('#view').focus();
+    const notice = page.getByText('There is no floor here.');
+    for (let k = 0; k < 3 && !(await notice.isVisible()); ++k) {
+      await page.keyboard.press('KeyM');
+      await page.waitForTimeout(500);
+    }
+    await notice.waitFor();
+    await page.mouse.click(640, 600);
+    await expect.poll(async () => height(await pose_of(page))).toBeLessThan(39);
+    await notice.waitFor({ state: 'hidden', timeout: 2000 }); // it would go by itself after 10 s
+  });
+});
+
 describe('a visit that begins inside', () => {
   const servers: Record<string, RunningServer> = {};
   beforeAll(async () => {
@@ -220,6 +239,37 @@ describe('a visit that begins inside', () => {
       expect_inside(await pose_of(page));
     }
     await keep_screenshot(page, 'orbit-inside');
+  });
+});
+
+describe('an author of a scene without a scale', () => {
+  it('is asked about a door while its frame is seen, and the plan knows the answer at once', async () => {
+    const room = path.join(scratch_folder(), 'room.ply');
+    write_room(room);
+    const { url } = await start_server(room, ['--min-fps', '0', '--up', '-y']);
+    const { page, errors } = await open(`${url}?author`, {
+      viewport: { width: 1440, height: 900 },
+    });
+    const [question, frame] = [page.locator('#author-door'), page.locator('#door-frame.shown')];
+    const look = (up_deg: number): Promise<void> => {
+      const half = (up_deg * Math.PI) / 360;
+      const at = [0, -eye_m, -2, Math.sin(half), 0, 0, Math.cos(half), 60].join(',');
+      return page.evaluate((hash) => void (location.hash = hash), `at=${at}`);
+    };
+    await page.locator('#button-plan').click();
+    const plan = page.locator('#plan-panel');
+    await plan.getByText('units of the scene').waitFor();
+    for (const up_deg of [0, 80, 0]) {
+      await look(up_deg);
+      for (const part of [question, frame])
+        await part.waitFor({ state: up_deg === 0 ? 'visible' : 'hidden' });
+      await keep_screenshot(page, `door-question-${up_deg}`);
+    }
+    await page.locator('#author-door-fits').click();
+    await question.waitFor({ state: 'hidden' });
+    await plan.getByText(/^about [\d.,]+\s(ft²|mi²) · [^·]*$/).waitFor();
+    await keep_screenshot(page, 'door-answered');
+    expect(errors).toEqual([]);
   });
 });
 

@@ -8,6 +8,7 @@ import { read_document } from '#client/tour/load';
 import { embed_code, frame_sites, read_shared, share_address } from '#client/tour/share';
 import { read_supersplat } from '#client/tour/supersplat';
 import { default_stay_s, read_tours, write_tours } from '#client/tour/tour';
+import { uncovered } from '#client/ui/uncovered';
 import settings from '../support/supersplat_settings.json';
 import { expect_vec } from './cameras';
 
@@ -305,5 +306,29 @@ describe('a shared link', () => {
     ] as const) {
       expect(frame_sites(header), String(header)).toEqual(sites);
     }
+  });
+});
+
+describe('the hotspot of the stop that is shown', () => {
+  const card = { left: 12, right: 378, top: 580, bottom: 766 };
+  const toolbar = { left: 6, right: 384, top: 776, bottom: 830 };
+
+  it.each([
+    ['stays where nothing covers it', [200, 300], [200, 300]],
+    ['comes above the card', [200, 620], [200, 556]],
+    ['is not touched by the card', [200, 570], [200, 556]],
+    ['comes out from between card and toolbar', [200, 771], [200, 556]],
+  ] as const)('%s on a phone', (_, at, to) => {
+    expect(uncovered(at, [card, toolbar], [390, 844])).toEqual(to);
+  });
+
+  it.each([
+    ['beside the card', [280, 600], [316, 600]],
+    ['above it, where that is nearer', [100, 500], [100, 459]],
+    ['as it is where no place is free', [20, 20], [20, 20]],
+  ] as const)('comes %s on a desktop', (_, at, to) => {
+    const all = { left: 0, right: 1280, top: 0, bottom: 720 };
+    const covers = at[0] === 20 ? [all] : [{ left: 12, right: 292, top: 483, bottom: 706 }];
+    expect(uncovered(at, covers, [1280, 720])).toEqual(to);
   });
 });

@@ -5,9 +5,9 @@ import { CameraController } from '#client/camera/camera_controller';
 import { no_axes } from '#client/camera/movement';
 import { WalkMapLoader } from '#client/walkable_area/walk_map_loader';
 import { plan_picture } from '#client/walkable_area/plan_picture';
-import { sheet_for, with_resolution } from '#client/walkable_area/plan_sheet';
+import { notes_of, sheet_for, with_resolution } from '#client/walkable_area/plan_sheet';
 import { cells_of, px_of } from '#client/walkable_area/plan_view';
-import { door_ahead, metres_per_unit } from '#client/walk/door';
+import { door_ahead, door_in_view, metres_per_unit } from '#client/walk/door';
 import { floor_along } from '#client/walk/floor';
 import { MapWalker } from '#client/walk/map_walker';
 import { find_path } from '#client/walk/path';
@@ -22,6 +22,8 @@ import {
   type WalkMap,
 } from '#client/walk/walk_map';
 import { stand_below } from '#client/walk/walker';
+import { text } from '#client/text/text';
+import { MeasureList } from '#client/tour/measure_list';
 import type { AccessToken } from '#client/session/token';
 import { expect_vec } from './cameras';
 import { flat_map, map, random_from } from './walk_maps';
@@ -182,6 +184,28 @@ describe('a door before the author', () => {
       fov_y_rad: 1,
     };
     expect(door_ahead(map, eye)).toBeUndefined();
+    expect(door_in_view(map, eye, 1)).toBeUndefined();
+  });
+
+  it.each([
+    ['ahead', eye_m, true],
+    ['below the view of those who look up', eye_m + 90, false],
+  ])('is seen only in the view: %s', (_, height, seen) => {
+    const position: Vec3 = [-1, 1, eye_m];
+    const orientation = look_at(position, [-1, 9, height], up);
+    expect(door_in_view(map, { position, orientation, fov_y_rad: 1 }, 1.6) !== undefined).toBe(
+      seen,
+    );
+  });
+
+  it('gives measures and plans their scale at once', () => {
+    const measures = new MeasureList();
+    const heard: unknown[] = [];
+    measures.changed.listen(() => heard.push(measures.metres_per_unit));
+    measures.set_scale(metres_per_unit({ ...map, cell: 0.2 }));
+    expect(heard).toEqual([0.5]);
+    measures.set_scale(0.5);
+    expect(heard).toEqual([0.5]);
   });
 });
 
@@ -406,6 +430,8 @@ describe('a printed plan', () => {
       metres_per_unit: undefined,
     });
     expect(denominator).toBeUndefined();
+    expect(notes_of({ ...metric, metres_per_unit: undefined })).toContain(text.measure.no_scale);
+    expect(notes_of(metric)).not.toContain(text.measure.no_scale);
     expect(400 * px_per_cell).toBeCloseTo(inner[1]);
   });
 

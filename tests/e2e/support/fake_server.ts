@@ -141,8 +141,14 @@ function make_peer(socket: WebSocket): Peer {
   };
 }
 
+interface SceneWords {
+  readonly upIsDoubtful?: boolean;
+  readonly title?: string;
+  readonly credits?: string;
+}
+
 /** A welcome to a small scene whose pictures are JPEGs of 640x360. */
-export function welcome(scene: { readonly upIsDoubtful?: boolean } = {}): ServerBody {
+export function welcome(scene: SceneWords = {}): ServerBody {
   return {
     case: 'welcome',
     value: {

@@ -37,6 +37,7 @@ export const stream_of =
         frameId: BigInt(peer.heard.length),
         poseId: body.value.poseId,
         poseClientTimeUs: body.value.clientTimeUs,
+        ...(body.value.worldFromCamera && { renderPose: body.value.worldFromCamera }),
         fovYRad: body.value.fovYRad,
         codec: Codec.MJPEG,
         idr: true,

@@ -230,7 +230,7 @@ TEST_F(UsageStatisticsTest, TheSummaryHasCountsAndTitles) {
   const UsageStatistics statistics({}, counts_, background_);
   const VisitsPage pages = page_of(statistics);
   counts_.visit("<hall>", DeviceKind::desktop, "3f0c91d27a5e");
-  counts_.spend("<hall>", 7200.0, 3'000'000'000);
+  counts_.spend("<hall>", 4212.0, 3'000'000'000);
   counts_.reach("<hall>", {0, 0});
   counts_.reach("<hall>", {0, 7});
   titles_.tours = std::make_shared<const std::vector<TourTitles>>(
@@ -240,14 +240,14 @@ TEST_F(UsageStatisticsTest, TheSummaryHasCountsAndTitles) {
   };
   const auto rows_of = [](const nlohmann::json& part) { return part.at("table").at("rows"); };
   const auto all = summary({});
-  EXPECT_EQ(all.at("facts"), "1 visits, 2.0 hours");
+  EXPECT_EQ(all.at("facts"), "1 visits, 1.2 hours");
   const auto& days = all.at("parts").at(0).at("plots").at(1).at("curves").at(0);
   EXPECT_EQ(days.at("x").back(), today);
-  EXPECT_EQ(days.at("y").back(), 2.0);
+  EXPECT_EQ(days.at("y").back(), 1.17);
   EXPECT_EQ(days.at("x").size(), 30u);
   EXPECT_EQ(rows_of(all.at("parts").at(1)).dump(),
             R"([[{"href":"visits?days=30&scene=%3Chall%3E","text":"<hall>"},)"
-            R"(1,2.0,120.0,1500.0,1,0,0,0,0]])");
+            R"(1,"1:10",70.2,2564.1,1,0,0,0,0]])");
   const auto one = summary({"scene=<hall>", "days=7"});
   EXPECT_EQ(one.at("title"), "Visits: <hall>, 7 days");
   EXPECT_EQ(rows_of(one.at("parts").at(2)).dump(),

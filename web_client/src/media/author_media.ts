@@ -26,6 +26,13 @@ interface Choice {
   readonly chosen: (name: string) => void;
 }
 
+/** A file on its way. Its elements move along when the fields are built anew, and so does what it is for. */
+interface Upload {
+  readonly field: readonly unknown[];
+  readonly parts: readonly [HTMLButtonElement, HTMLInputElement, HTMLOutputElement];
+  chosen: Choice['chosen'];
+}
+
 // All texts and files that one language may have of its own.
 const no_voice = { src: '', captions: '' };
 const no_sound = { src: '' };
@@ -37,6 +44,8 @@ export class AuthorMedia implements MediaFields {
   private folder_: MediaFolder | undefined;
   private readonly open_ = new Set<string>(); // summaries whose fields are shown
   private looked_: Promise<void> | undefined; // what is there is known
+  private owner_: readonly unknown[] = []; // of the fields that are built: a camera and a language
+  private uploads_: readonly Upload[] = [];
 
   use(scene_id: string, token: string | undefined): void {
     this.folder_ = token === undefined ? undefined : new MediaFolder(scene_id, token);
@@ -49,6 +58,7 @@ export class AuthorMedia implements MediaFields {
     language: string,
     change: (change: Partial<Stop>, field?: string) => void,
   ): HTMLElement {
+    this.owner_ = ['stop', stop().eye, language];
     const media = stop().media ?? [];
     const words = text.media;
     // Typing in one field rebuilds no other, so what is there now is asked for.
@@ -133,6 +143,7 @@ export class AuthorMedia implements MediaFields {
     language: string,
     change: (change: Partial<Tour>, field?: string) => void,
   ): HTMLElement {
+    this.owner_ = ['tour', tour.stops[0]?.eye, language];
     const words = text.media;
     const { sound } = tour;
     const choice = this.choice({
@@ -266,6 +277,14 @@ export class AuthorMedia implements MediaFields {
     void this.looked_?.then(fill);
     select.addEventListener('focus', fill); // others may have been sent meanwhile
     select.addEventListener('change', () => chosen(select.value));
+    const row = (...parts: HTMLElement[]): HTMLElement =>
+      make('div', { className: 'media-choice' }, make('span', {}, label), select, ...parts);
+    const field = [...this.owner_, control, this.folder_];
+    const upload = this.uploads_.find((other) => other.field.every((part, i) => part === field[i]));
+    if (upload) {
+      upload.chosen = chosen;
+      return row(...upload.parts);
+    }
     const said = make('output', { 'aria-live': 'polite' });
     const file = make('input', {
       type: 'file',
@@ -278,43 +297,38 @@ export class AuthorMedia implements MediaFields {
       { type: 'button', 'aria-label': words.upload_for({ label }) },
       words.upload,
     );
+    const own: Upload = { field, parts: [button, file, said], chosen };
     button.addEventListener('click', () => file.click());
     file.addEventListener('change', () => {
       const [sent] = file.files ?? [];
-      if (sent) void this.send(sent, button, said, chosen);
+      if (sent) void this.send(sent, own);
       file.value = '';
     });
     const { folder_: folder } = this;
     button.disabled = folder === undefined;
     if (folder === undefined) button.title = words.cannot_send;
-    return make(
-      'div',
-      { className: 'media-choice' },
-      make('span', {}, label),
-      select,
-      button,
-      file,
-      said,
-    );
+    return row(...own.parts);
   }
 
-  private async send(
-    file: File,
-    button: HTMLButtonElement,
-    said: HTMLOutputElement,
-    chosen: (name: string) => void,
-  ): Promise<void> {
+  private async send(file: File, upload: Upload): Promise<void> {
     const { folder_: folder } = this;
     if (!folder) return;
+    const [button, , said] = upload.parts;
     button.disabled = true;
+    this.uploads_ = [...this.uploads_, upload];
+    const end = (): void => {
+      this.uploads_ = this.uploads_.filter((other) => other !== upload);
+      button.disabled = false;
+    };
     try {
       const name = await folder.add(file, (words) => (said.textContent = words));
       said.textContent = '';
-      if (button.isConnected) chosen(name);
+      end();
+      if (button.isConnected) upload.chosen(name);
       else by_id('author-said', HTMLOutputElement).textContent = text.media.sent({ name });
     } catch (error) {
       said.textContent = error instanceof Error ? error.message : String(error);
+      end();
     }
-    button.disabled = false;
   }
 }

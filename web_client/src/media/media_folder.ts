@@ -9,6 +9,7 @@ import { refusal } from '../tour/save';
 export class MediaFolder {
   /** Names of the files that are there. */
   names: readonly string[] = [];
+  private readonly sending_ = new Set<string>(); // names that are taken, too
 
   constructor(
     readonly scene_id: string,
@@ -39,11 +40,12 @@ export class MediaFolder {
     if (file.size > max_media_bytes) throw new Error(text.media.too_large);
     const other = await other_format(file);
     if (other) throw new Error(text.media.not_shown({ name: file.name, ...other }));
-    const name = free_name(file.name, this.names);
+    const name = free_name(file.name, [...this.names, ...this.sending_]);
+    this.sending_.add(name);
     const path = scene_path(this.scene_id, `media/${encodeURIComponent(name)}`);
     await send(server_address(location.href, path), this.token_, file, (share) =>
       progress(text.media.sending({ share: number(share, { style: 'percent' }) })),
-    );
+    ).finally(() => this.sending_.delete(name));
     this.names = [...this.names, name].sort();
     return name;
   }

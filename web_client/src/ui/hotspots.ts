@@ -10,6 +10,7 @@ import { max_stops } from '../tour/limits';
 import type { TourState } from '../tour/player';
 import type { Stop, Tour } from '../tour/tour';
 import type { PortalScenes } from './portal_scenes';
+import { uncovered, type Cover } from './uncovered';
 
 /** Shows the stops of a tour as buttons in the picture. */
 export class Hotspots {
@@ -19,6 +20,8 @@ export class Hotspots {
   private spots_: { readonly stop: Stop; readonly button: HTMLButtonElement }[] = [];
   private asked_ = 0; // sets of markers that the server was asked about
   private asked_about_ = ''; // the last one
+  private covers_: readonly Cover[] = []; // what lies over the view
+  private eye_: Eye | undefined; // of the picture that the visitor sees
   private behind_: readonly number[] = []; // indices of those that something in the scene covers
 
   constructor(
@@ -31,6 +34,14 @@ export class Hotspots {
       if (key === 'Escape') this.host_.classList.add('labels-dismissed');
     });
     parts_.seen.moved.listen((eye) => this.put(eye));
+    const elements = [...document.querySelectorAll('#tour, #toolbar, #scene-title, #shared-tour')];
+    const resized = new ResizeObserver(() => {
+      this.covers_ = elements
+        .map((element) => element.getBoundingClientRect())
+        .filter((rect) => rect.width > 0);
+      if (this.eye_) this.put(this.eye_);
+    });
+    for (const element of [this.host_, ...elements]) resized.observe(element);
     parts_.navigation.entered.listen(() => (this.asked_about_ = ''));
     parts_.worker.on('hidden_markers', ({ id, indices }) => {
       if (id !== this.asked_) return; // an answer about other markers
@@ -53,13 +64,21 @@ export class Hotspots {
   }
 
   private put(eye: Eye): void {
+    this.eye_ = eye;
     const { clientWidth: width_px, clientHeight: height_px } = this.parts_.view;
     for (const { stop, button } of this.spots_) {
       const at = stop.marker && project(stop.marker, eye, width_px / height_px);
       const inside = at && at[0] > 0 && at[0] < 1 && at[1] > 0 && at[1] < 1 ? at : undefined;
       button.hidden = !inside;
       if (!inside) continue;
-      const [x, y] = [inside[0] * width_px, inside[1] * height_px];
+      const [own_x, own_y] = [inside[0] * width_px, inside[1] * height_px];
+      // The card tells of this one.
+      const [x, y] = uncovered([own_x, own_y], stop === this.stop_ ? this.covers_ : [], [
+        width_px,
+        height_px,
+      ]);
+      button.classList.toggle('aside', x !== own_x || y !== own_y);
+      button.style.setProperty('--towards', `${Math.atan2(own_y - y, own_x - x)}rad`);
       button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
       button.classList.toggle('leftward', inside[0] > 0.5); // where its label has room
     }

@@ -1,6 +1,7 @@
 // A door of 2 m as this map takes it, on the floor before a visitor. Pure.
 import { add, dot, forward, normalize, rotate, scale, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
+import { project } from '../camera/ray';
 import { clear_near } from './map_walker';
 import { cells_per_eye_height, to_grid, to_world, type WalkMap } from './walk_map';
 
@@ -34,4 +35,22 @@ export function door_ahead(map: WalkMap, eye: Eye): readonly Vec3[] | undefined 
     corner(half_width, height),
     corner(half_width, 0),
   ];
+}
+
+/** The corners in the view, as project() has them; undefined: the door is not seen. */
+export function door_in_view(
+  map: WalkMap,
+  eye: Eye,
+  aspect: number,
+): readonly (readonly [x: number, y: number])[] | undefined {
+  const corners = (door_ahead(map, eye) ?? []).flatMap((corner) => {
+    const at = project(corner, eye, aspect);
+    return at ? [at] : [];
+  });
+  if (corners.length < 4) return undefined; // there is none, or a part is behind the eye
+  const is_seen = [0, 1].every((axis) => {
+    const along = corners.map((at) => at[axis]!);
+    return Math.max(...along) > 0 && Math.min(...along) < 1;
+  });
+  return is_seen ? corners : undefined;
 }

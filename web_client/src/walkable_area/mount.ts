@@ -39,7 +39,6 @@ export class WalkableArea {
   private plan_: PlanPanel | undefined;
   private house_: Dollhouse | undefined;
   private door_: DoorQuestion | undefined;
-  private has_scale_ = true;
   private tour_: TourState | undefined;
   private eye_: Eye;
   private participants_: readonly Vec3[] = [];
@@ -50,13 +49,11 @@ export class WalkableArea {
     const { navigation, worker, toolbar, seen, token, notice, tour_shown, measures } = parts_;
     this.loader_ = new WalkMapLoader(token);
     this.eye_ = navigation.eye;
-    navigation.entered.listen(({ scene }) => {
-      this.has_scale_ = scene.metresPerUnit > 0;
-      this.enter(scene.sceneId);
-    });
+    navigation.entered.listen(({ scene }) => this.enter(scene.sceneId));
     navigation.went_back.listen(() => this.house_?.close());
     navigation.taken_over.listen(() => this.walking_?.stay());
     navigation.led_away.listen(() => {
+      notice.withdraw(text.floor_plan.no_floor);
       this.house_?.end();
       this.walking_?.stay();
     });
@@ -84,7 +81,10 @@ export class WalkableArea {
       this.tour_ = state;
       this.show_stops();
     });
-    measures.changed.listen(() => this.plan_?.show_scale());
+    measures.changed.listen(() => {
+      this.plan_?.show_scale();
+      if (measures.metres_per_unit) this.door_?.ask(undefined);
+    });
     worker.on('presented', () => this.presented());
     this.loader_.computing.listen(() => notice.show(text.floor_plan.preparing, 10));
     this.loader_.known.listen((map) => {
@@ -156,13 +156,12 @@ export class WalkableArea {
   }
 
   private async ask_scale(map: WalkMap): Promise<void> {
-    const { set_scale } = this.parts_;
-    if (!set_scale || this.has_scale_) return;
+    const { set_scale, measures } = this.parts_;
+    if (!set_scale || measures.metres_per_unit) return;
     const { DoorQuestion } = await load_part(() => import('./door_question'));
     if (map !== this.map_) return;
-    this.door_ ??= new DoorQuestion({ ...this.parts_, set_scale });
+    this.door_ ??= new DoorQuestion({ ...this.parts_, set_scale }, this.eye_);
     this.door_.ask(map);
-    this.door_.move(this.eye_);
   }
 
   private async open_plan(): Promise<void> {

@@ -29,7 +29,7 @@ import {
   type PlanScale,
 } from './plan_drawing';
 import { plan_picture, type PlanPicture } from './plan_picture';
-import { area_of_storey, plan_png } from './plan_sheet';
+import { area_of_storey, notes_of, plan_png } from './plan_sheet';
 import { cells_of, px_of, type PlanView } from './plan_view';
 import './floor_plan.css';
 
@@ -334,7 +334,7 @@ export class PlanPanel {
     if (this.is_large) draw_areas(context, made, view, this.scale, font_px);
     draw_scale_bar(context, view, this.scale, font_px);
     const area = area_of_storey(made.areas.cells, this.scale);
-    this.words_.textContent = `${area} · ${text.floor_plan.sketch}`;
+    this.words_.textContent = [area, ...notes_of(this.scale)].join(' · ');
     for (const position of this.participants_)
       if (this.is_beside(position)) this.draw_dot(context, view, position, participant_colour);
     if (this.storey_ === this.visitors_storey_) this.draw_visitor(context, view);

@@ -88,7 +88,7 @@ export async function plan_png(
   draw_scale_bar(context, view, scale, font_px);
   write_words(context, view, [
     [storey, area_of_storey(areas.cells, scale), ratio_of(sheet)].filter(Boolean).join(' · '),
-    text.floor_plan.sketch,
+    ...notes_of(scale),
   ]);
   const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
   if (!blob) return undefined;
@@ -99,6 +99,12 @@ export async function plan_png(
 
 export const area_of_storey = (cells: number, scale: PlanScale): string =>
   text.floor_plan.area({ area: area_text(cells, scale) });
+
+/** What readers of a plan must know. Without a scale, its numbers are no metres. */
+export const notes_of = ({ metres_per_unit }: PlanScale): readonly string[] => [
+  text.floor_plan.sketch,
+  ...(metres_per_unit ? [] : [text.measure.no_scale]),
+];
 
 const ratio_of = ({ denominator, name }: Sheet): string =>
   denominator
