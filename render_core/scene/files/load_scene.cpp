@@ -1,9 +1,11 @@
 #include "render_core/scene/files/load_scene.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/files/sanitize.h"
@@ -11,6 +13,7 @@
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/json_field.h"
 #include "render_core/scene/formats/load_context.h"
+#include "render_core/scene/formats/losses.h"
 #include "render_core/scene/transform.h"
 #include "render_core/scene/tree/read_tree.h"
 
@@ -27,6 +30,26 @@ DecodedScene read_location(const SceneLocation& location, const LoadOptions& opt
   return read_about_origin([&](const glm::dvec3& origin) -> DecodedScene {
     return {scene.format, read_levels(scene, context, origin), scene.notes};
   });
+}
+
+constexpr float origin_error = 1e-4f;  // what an origin promises at most, world units
+
+/// One origin does not serve a scene whose parts are far apart.
+void note_rounding(const GaussianCloud& cloud, std::vector<std::string>& notes) {
+  std::size_t rounded = 0;
+  float largest = 0.0f;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const glm::vec3 far = glm::abs(cloud.mean[i]);
+    const float step = std::max({far.x, far.y, far.z}) * 0x1p-23f;
+    if (step <= std::max(middle_scale(cloud.scale[i]), origin_error)) continue;
+    ++rounded;
+    largest = std::max(largest, step);
+  }
+  if (rounded > 0)
+    notes.push_back(fmt::format(
+        "{} of {} Gaussians are smaller than the steps of floats so far from the others "
+        "(up to {:.3g}); split the scene into its parts",
+        rounded, cloud.size(), largest));
 }
 
 }  // namespace
@@ -82,6 +105,7 @@ Scene load_scene(const SceneLocation& location, const LoadOptions& options) {
         hints, options.up, scene.notes, pool, options.keep_view);
   scene.hints.origin = hints.origin;
   note_origin(hints.origin, scene.notes);
+  note_rounding(scene.cloud, scene.notes);
   context.report(1.0);
   return scene;
 }

@@ -233,6 +233,15 @@ TEST_F(SceneOriginTest, FarFloatsStayAsTheyAre) {
   }
 }
 
+TEST_F(SceneOriginTest, PartsTooFarApartAreTold) {
+  const GaussianCloud cloud = small_splats();
+  Positions positions = moved(cloud, glm::dvec3(0.0));
+  for (std::size_t i = 0; i < 80; ++i) positions[i] += survey;
+  const Scene scene = load_scene(write("apart.ply", double_ply(cloud, positions, "ascii")));
+  EXPECT_THAT(scene.notes,
+              testing::Contains(testing::StartsWith("80 of 200 Gaussians are smaller")));
+}
+
 TEST_F(SceneOriginTest, PartsShareOneOrigin) {
   const GaussianCloud cloud = small_splats(1000);
   const Positions positions = moved(cloud, survey);
