@@ -11,8 +11,8 @@ SceneSize read_scene_size(const SceneLocation& scene, const LoadOptions& options
   SceneSize size;
   if (!scene.has_levels()) {
     size = format.size(scene.files);
-  } else if (format.size_of_chosen) {
-    size = format.size_of_chosen(scene.files, options.lod, options.gaussian_budget);
+  } else if (format.count) {
+    size = {format.count(scene.files, options.lod, options.gaussian_budget), max_sh_degree};
   } else {
     const OpenLevels levels = format.open_levels(scene.files.open(), scene.files.index, options.lod,
                                                  options.gaussian_budget, max_gaussians);

@@ -128,9 +128,9 @@ struct SceneFormat {
   OpenLevels (*open_levels)(const std::shared_ptr<const FileSet>& files, const std::string& index,
                             std::optional<int> level, std::optional<std::size_t> budget,
                             std::uint64_t most) = nullptr;
-  /// The size of the chosen levels, if it can be told without opening all of them.
-  SceneSize (*size_of_chosen)(const SceneFiles& files, std::optional<int> level,
-                              std::optional<std::size_t> budget) = nullptr;
+  /// The Gaussians of the chosen levels, if they can be counted without opening all of them.
+  std::size_t (*count)(const SceneFiles& files, std::optional<int> level,
+                       std::optional<std::size_t> budget) = nullptr;
 
   /// Writes a cloud that is about `origin`.
   void (*write)(const GaussianCloud& cloud, const glm::dvec3& origin, ThreadPool& pool,

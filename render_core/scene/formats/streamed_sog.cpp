@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -25,7 +24,6 @@ constexpr std::size_t max_files = std::size_t{1} << 16;
 constexpr std::size_t max_name_bytes = 4096;
 constexpr std::size_t max_nodes = std::size_t{1} << 16;
 constexpr int max_tree_depth = 64;
-constexpr std::size_t most_read_for_degree = 32;  // files; a level of 6 M Gaussians has 12
 
 LodPiece parse_piece(const JsonField& field, std::size_t file_count) {
   const LodPiece piece{field.at("file").count(), field.at("offset").count(),
@@ -204,34 +202,12 @@ std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t b
   return choose(tree, wanted);
 }
 
-SceneSize size_of_streamed_sog(const OpenHolder& holder_of, std::optional<int> level,
+std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget) {
-  const LodTree tree = read_lod_tree(*holder_of(index_name)->open(index_name));
-  SceneSize size;
-  const auto read = [&](const std::string& name) {
-    const auto holder = holder_of(name);
-    const SogMeta meta =
-        name.ends_with(".sog")
-            ? parse_sog_meta(ZipFiles(*holder->open(name), "meta.json"), "meta.json")
-            : parse_sog_meta(*holder, name);
-    size.sh_degree =
-        std::max(size.sh_degree, meta.hides_sh_degree() ? max_sh_degree : meta.sh_degree);
-    return meta.count;
-  };
-  const std::size_t environment = tree.environment.empty() ? 0 : read(tree.environment);
-  const LodChoice choice = choose(tree, level, budget, environment);
-  size.gaussians = choice.count + environment;
-  std::set<std::size_t> files;
-  for (const LodPiece& piece : choice.pieces)
-    if (piece.count > 0) files.insert(piece.file);
-  if (files.size() > most_read_for_degree) size.sh_degree = max_sh_degree;
-  try {
-    for (const std::size_t file : files)
-      if (size.sh_degree < max_sh_degree) read(tree.files[file]);
-  } catch (const InputError&) {  // it is reported when the scene is loaded
-    size.sh_degree = max_sh_degree;
-  }
-  return size;
+  const LodTree tree = read_lod_tree(*folder.open(index_name));
+  const std::size_t environment =
+      tree.environment.empty() ? 0 : open_part(folder, tree.environment).meta.count;
+  return choose(tree, level, budget, environment).count + environment;
 }
 
 OpenStreamedSog open_streamed_sog(const FileSet& folder, std::optional<int> level,
@@ -316,10 +292,15 @@ OpenLevels open_levels(const std::shared_ptr<const FileSet>& files, const std::s
   return scene;
 }
 
-SceneSize size_of_chosen(const SceneFiles& files, std::optional<int> level,
+/// An archive is unpacked as a whole only where its environment counts, too.
+std::size_t count_chosen(const SceneFiles& files, std::optional<int> level,
                          std::optional<std::size_t> budget) {
-  return size_of_streamed_sog([&](const std::string& name) { return files.open(name); }, level,
-                              budget);
+  if (files.index.empty()) {
+    const auto tree = files.open(index_name);
+    if (read_lod_tree(*tree->open(index_name)).environment.empty())
+      return count_streamed_sog(*tree, level, budget);
+  }
+  return count_streamed_sog(*files.open(), level, budget);
 }
 
 }  // namespace
@@ -330,7 +311,7 @@ constexpr SceneFormat streamed_sog_format = {
     .index = index_name,
     .is_mine = [](const ByteSource&, std::string_view extension) { return extension == ".ssog"; },
     .open_levels = open_levels,
-    .size_of_chosen = size_of_chosen,
+    .count = count_chosen,
 };
 
 }  // namespace catgs

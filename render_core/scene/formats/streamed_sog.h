@@ -2,8 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,11 +9,12 @@
 #include "render_core/scene/formats/file_set.h"
 #include "render_core/scene/formats/format_limits.h"
 #include "render_core/scene/formats/load_context.h"
-#include "render_core/scene/formats/scene_format.h"
 #include "render_core/scene/formats/sog.h"
 #include "render_core/scene/gaussian_cloud.h"
 
 namespace catgs {
+
+struct SceneFormat;
 
 // PlayCanvas' streamed SOG: a folder of SOGs and lod-meta.json, a tree whose nodes hold the same
 // part of the scene at several levels of detail. We load one level per node, once.
@@ -54,13 +53,9 @@ LodChoice choose_level(const LodTree& tree, int level);
 /// finer level, cheapest first. Empty when not even the coarsest level fits.
 std::optional<LodChoice> choose_within_budget(const LodTree& tree, std::size_t budget);
 
-/// Gives files that have the one of this name, and perhaps no other.
-using OpenHolder = std::function<std::shared_ptr<const FileSet>(const std::string& name)>;
-
-/// Size of what `level` or `budget` select (see open_streamed_sog), the environment included. Reads
-/// meta data only, and no image. Where very many SOGs are selected, or only images tell the SH
-/// degree, the highest is assumed. Throws InputError.
-SceneSize size_of_streamed_sog(const OpenHolder& holder_of, std::optional<int> level,
+/// Number of Gaussians that `level` or `budget` select (see open_streamed_sog), the environment
+/// included. Reads lod-meta.json and the environment's meta data only. Throws InputError.
+std::size_t count_streamed_sog(const FileSet& folder, std::optional<int> level,
                                std::optional<std::size_t> budget);
 
 /// One of the SOGs that a level consists of. Nothing of its files stays in memory, because a scene

@@ -85,36 +85,6 @@ TEST_F(StreamedSogTest, ArchivesAreReadAsFoldersAre) {
             40u);
 }
 
-TEST_F(StreamedSogTest, SizesHaveTheDegreeOfTheChosenSogs) {
-  write("middle/meta.json", "{}");
-  write("lod-meta.json", meta_.dump());
-  const auto degree = [&](int level) {
-    LoadOptions options;
-    options.lod = level;
-    return read_scene_size(locate_scene(folder_.path()), options).sh_degree;
-  };
-  EXPECT_EQ(degree(0), 2);
-  EXPECT_EQ(degree(1), 3) << "of a SOG that cannot be read";
-  EXPECT_EQ(degree(2), 1);
-  write("coarse.sog", zip(encode_sog(random_cloud(33, 0), 2)));
-  meta_["filenames"][2] = "coarse.sog";
-  write("lod-meta.json", meta_.dump());
-  EXPECT_EQ(degree(2), 0);
-  const auto archive = write("museum.ssog", zip(files_below(folder_.path())));
-  LoadOptions coarsest;
-  coarsest.lod = 2;
-  EXPECT_EQ(read_scene_size(locate_scene(archive), coarsest).sh_degree, 0);
-  // Very many are not read.
-  for (int i = 0; i < 40; ++i) {
-    meta_["filenames"].push_back(fmt::format("{}/meta.json", i));
-    meta_["tree"]["children"].push_back({{"lods", {{"2", piece(3 + i, 0, 1)}}}});
-    for (const auto& [file, content] : encode_sog(random_cloud(1, 0), 2))
-      write(fmt::format("{}/{}", i, file), content);
-  }
-  write("lod-meta.json", meta_.dump());
-  EXPECT_EQ(degree(2), 3);
-}
-
 TEST_F(StreamedSogTest, LevelsAreAssembledFromAllNodes) {
   EXPECT_EQ(load().cloud.size(), 600u);
   EXPECT_EQ(load(0).cloud.size(), 600u);
