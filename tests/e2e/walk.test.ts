@@ -233,7 +233,7 @@ describe('a visit that begins inside', () => {
       await drag(page, windows.desktop, by);
       expect_inside(await pose_of(page));
     }
-    expect(distance(begin, await pose_of(page))).toBeGreaterThan(0.3);
+    expect(distance(begin, await pose_of(page))).toBeGreaterThan(0.1);
     for (const key of ['ArrowLeft', 'KeyS', 'KeyD', 'KeyE']) {
       await hold(page, key, 2000);
       expect_inside(await pose_of(page));
