@@ -201,8 +201,6 @@ CameraList read_transforms(const JsonField& file, const glm::dvec3& origin) {
 }
 
 CameraList read_path(const JsonField& file, const glm::dvec3& origin) {
-  if (const auto type = file.find("camera_type"); type && type->text() != "perspective")
-    type->fail("is not a perspective camera", "this renderer draws perspective pictures only");
   CameraList list;
   const JsonField cameras = file.at("camera_path");
   for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -25,7 +25,7 @@ struct CameraList {
 ///
 ///   cameras.json      of a 3DGS training, in the order of the pictures' names
 ///   transforms.json   of nerfstudio, instant-ngp and Blender data sets; also transforms_test.json
-///   camera_path.json  of nerfstudio's viewer; perspective cameras only
+///   camera_path.json  of nerfstudio's viewer
 ///   transforms_*.json that `ns-export cameras` writes
 ///
 /// Places are returned about `origin`. Throws InputError with the field of a mistake.

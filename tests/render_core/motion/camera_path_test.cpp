@@ -254,7 +254,6 @@ TEST_F(CameraPaths, MistakesNameTheirField) {
   for (const auto& [text, where] : std::vector<Mistake>{
            {"[]", ""},
            {"{}", ""},
-           {R"({"camera_type": "fisheye", "camera_path": []})", "camera_type"},
            {R"({"camera_path": [{"camera_to_world": [1, 2]}]})", "camera_path[0].camera_to_world"},
            {R"({"frames": [{"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0],
                             [0, 0, 5, 0], [0, 0, 0, 1]]}]})",

@@ -281,12 +281,14 @@ TEST_F(Frames, EachPictureHasItsOwnLensAndName) {
 }
 
 TEST_F(Frames, RefusesLensesThatNoPictureShows) {
-  for (const auto& [fields, word] : std::initializer_list<std::array<const char*, 2>>{
-           {R"("camera_model": "EQUIRECTANGULAR", "w": 64, "h": 32)", "EQUIRECTANGULAR"},
-           {R"("is_fisheye": true)", "FISHEYE"}}) {
-    const auto file = folder_.write(
-        "a.json",
-        fmt::format(R"({{{}, "frames": [{{"transform_matrix": {}}}]}})", fields, identity));
+  for (
+      const auto& [fields, word] : std::initializer_list<std::array<const char*, 2>>{
+          {R"("camera_model": "EQUIRECTANGULAR", "w": 64, "h": 32, "frames": [{"transform_matrix":)",
+           "EQUIRECTANGULAR"},
+          {R"("is_fisheye": true, "frames": [{"transform_matrix":)", "FISHEYE"},
+          {R"("camera_type": "equirectangular", "camera_path": [{"camera_to_world":)",
+           "EQUIRECTANGULAR"}}) {
+    const auto file = folder_.write("a.json", fmt::format("{{{} {}}}]}}", fields, identity));
     const std::string start =
         fmt::format("frames {} --renderer cpu --trace {} ", path("wall.ply"), file.string());
     const Outcome refused = run(start + "--size 64x48 --out " + path("no.png"));
