@@ -126,14 +126,47 @@ bool keeps_sidecar(const Conversion& conversion) {
          (shares_sidecar(conversion) || !is_unedited(sidecar));
 }
 
-/// Refuses a sidecar that stays and tells another view than that of the moved scene.
+/// Another scene than the output that uses the sidecar; empty: none.
+std::filesystem::path other_scene_of(const std::filesystem::path& sidecar,
+                                     const std::filesystem::path& out) {
+  std::error_code error;
+  const auto folder = sidecar.has_parent_path() ? sidecar.parent_path() : ".";
+  for (std::filesystem::directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code unknown;
+    const auto& path = it->path();
+    const bool is_scene = path.filename().string().starts_with(sidecar.stem().string()) &&
+                          (it->is_regular_file(unknown) || it->is_directory(unknown));
+    if (!is_scene || std::filesystem::equivalent(path, out, unknown) ||
+        std::filesystem::equivalent(path, sidecar, unknown))
+      continue;
+    try {
+      if (std::filesystem::equivalent(locate_scene(path).hints.sidecar, sidecar, unknown))
+        return path;
+    } catch (const InputError&) {  // it is no scene
+    }
+  }
+  return {};
+}
+
+/// Refuses outputs whose view a sidecar that is there would tell wrongly, and those whose view
+/// would be wrong for another scene that has the same sidecar.
 void check_sidecar_fits(const SceneHints& hints, const Conversion& conversion,
                         const EditAboutOrigin& done) {
-  if (!moves(conversion, done) || !keeps_sidecar(conversion)) return;
   const auto sidecar = sidecar_of(conversion.options.out);
-  if (tells_hints(sidecar, hints_of_output(hints, conversion, done))) return;
-  throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
-                   "give the output another name, or move the file away");
+  if (std::error_code error; !std::filesystem::exists(sidecar, error)) return;
+  const bool stays = keeps_sidecar(conversion);
+  if (stays && !moves(conversion, done)) return;
+  const auto other =
+      stays ? std::filesystem::path() : other_scene_of(sidecar, conversion.options.out);
+  if ((!stays && other.empty()) || tells_hints(sidecar, hints_of_output(hints, conversion, done)))
+    return;
+  if (stays)
+    throw InputError(sidecar.string(), "", "is there, and would not fit the moved scene",
+                     "give the output another name, or move the file away");
+  throw InputError(sidecar.string(), "",
+                   fmt::format("tells another view, that of {}", other.string()),
+                   "give the output another name or folder, or move the file away");
 }
 
 /// The output begins where the input does. Its own estimate would differ a little, so that pictures

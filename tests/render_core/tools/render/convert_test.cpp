@@ -277,6 +277,28 @@ TEST_F(Convert, AnotherSceneReplacesTheViewThatConvertWrote) {
   EXPECT_THAT(run(from_other + path("out.ply")).out, Not(HasSubstr("another scene")));
 }
 
+TEST_F(Convert, OutputsOfOneStemDoNotSpoilEachOthersView) {
+  ASSERT_EQ(convert("far.ply", "--translate=500123.4,5412345.3,431.2").exit_code, 0);
+  struct Case {
+    const char *in, *first, *second;
+    bool fits;
+  };
+  for (const Case& c : {Case{"far.ply", "a.sog", "a.tree", false},  // about its origin, and about 0
+                        Case{"ball.ply", "b.sog", "b.ply --translate=100,0,0", false},
+                        Case{"ball.ply", "c.spz", "c.tree", true}}) {
+    SCOPED_TRACE(c.second);
+    const auto convert_to = [&](const std::string& out) {
+      return run(fmt::format("convert {} {}", path(c.in), path(out)));
+    };
+    ASSERT_EQ(convert_to(c.first).exit_code, 0);
+    const nlohmann::json before = info(c.first).at("hints");
+    const Outcome second = convert_to(c.second);
+    EXPECT_EQ(second.exit_code, c.fits ? 0 : 2) << second.out;
+    EXPECT_EQ(second.out.find("tells another view, that of") == std::string::npos, c.fits);
+    EXPECT_EQ(info(c.first).at("hints"), before);
+  }
+}
+
 TEST_F(Convert, ALoneGaussianKeepsItsView) {
   GaussianCloud cloud = ball();
   cloud.resize(1, 0);
