@@ -18,29 +18,35 @@ double largest(const glm::vec2& v) { return std::max(std::abs(v.x), std::abs(v.y
 
 }  // namespace
 
-std::string camera_text(const Camera& camera) {
-  const auto& [p, q] = camera.world_from_camera;
-  const glm::vec2 &f = camera.focal_px, &c = camera.principal_point_px;
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {}", p.x, p.y, p.z, q.x, q.y, q.z, q.w, f.x,
-                     f.y, c.x, c.y);
+std::string camera_text(const PictureCamera& of) {
+  const glm::quat& q = of.camera.world_from_camera.orientation;
+  const glm::vec2 &f = of.camera.focal_px, &c = of.camera.principal_point_px;
+  const glm::dvec3 p = of.position(), &o = of.origin;
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", p.x, p.y, p.z, q.x, q.y, q.z, q.w,
+                     f.x, f.y, c.x, c.y, o.x, o.y, o.z);
 }
 
-std::optional<Camera> camera_of_picture(const std::filesystem::path& path) {
+std::optional<PictureCamera> camera_of_picture(const std::filesystem::path& path) {
   std::istringstream text(text_in_png(path, camera_key));
-  Camera camera;
-  auto& [p, q] = camera.world_from_camera;
-  for (float* number :
-       {&p.x, &p.y, &p.z, &q.x, &q.y, &q.z, &q.w, &camera.focal_px.x, &camera.focal_px.y,
-        &camera.principal_point_px.x, &camera.principal_point_px.y})
+  PictureCamera of;
+  Camera& camera = of.camera;
+  auto& [position, q] = camera.world_from_camera;
+  glm::dvec3 p, origin;
+  text >> p.x >> p.y >> p.z;
+  for (float* number : {&q.x, &q.y, &q.z, &q.w, &camera.focal_px.x, &camera.focal_px.y,
+                        &camera.principal_point_px.x, &camera.principal_point_px.y})
     text >> *number;
   if (!text) return std::nullopt;
-  return camera;
+  if (text >> origin.x >> origin.y >> origin.z) of.origin = origin;
+  position = glm::vec3(p - of.origin);
+  return of;
 }
 
-CameraDifference::CameraDifference(const Camera& a, const Camera& b) {
+CameraDifference::CameraDifference(const PictureCamera& of_a, const PictureCamera& of_b) {
+  const Camera &a = of_a.camera, &b = of_b.camera;
   const auto& [pa, qa] = a.world_from_camera;
   const auto& [pb, qb] = b.world_from_camera;
-  units = glm::distance(glm::dvec3(pa), glm::dvec3(pb));
+  units = glm::distance(of_a.position(), of_b.position());
   const glm::dquat turn = glm::conjugate(glm::dquat(qa)) * glm::dquat(qb);
   degrees = 360.0 / std::numbers::pi *
             std::atan2(glm::length(glm::dvec3(turn.x, turn.y, turn.z)), std::abs(turn.w));

@@ -196,14 +196,14 @@ RenderSetup prepare(const RenderOptions& options, bool quiet) {
   if (!options.trace.empty()) refuse_script_options(options);
   RenderSetup setup = prepare_scene(options, quiet);
   const std::vector<Lens> lenses = use_path(setup, options, make_path(options, setup.scene.hints));
-  setup.lenses = make_lenses(options.lens, setup.scene.hints.near_z, path_file(options), lenses);
+  setup.lenses = make_lenses(options.lens, setup.scene.hints, path_file(options), lenses);
   setup.camera = setup.lenses.front();
   if (setup.lenses.size() == 1) setup.lenses.clear();
   return setup;
 }
 
 RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
-  (void)make_lens(options.lens, 1.0f);  // a mistake appears before a large scene is read
+  (void)make_lens(options.lens, {});  // a mistake appears before a large scene is read
   RendererOptions core = renderer_options(options);
   RenderSetup setup;
   setup.view = view_settings(options.pipeline);
@@ -218,7 +218,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
     setup.scene = load_scene(options.scene, options.threads, quiet);
   }
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
-  setup.camera = make_lens(options.lens, setup.scene.hints.near_z);
+  setup.camera = make_lens(options.lens, setup.scene.hints);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
@@ -101,11 +102,11 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");
   command.add_option("--clip", options.clip,
-                     "Leave out Gaussians whose centre c has dot(N, c) > D, given as NX,NY,NZ,D. "
-                     "It takes the roof off a house");
+                     "Leave out Gaussians whose centre c has dot(N, c) > D, given as NX,NY,NZ,D "
+                     "in the coordinates of the scene's file. It takes the roof off a house");
 }
 
-Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& lens) {
+Camera make_lens(const LensOptions& options, const SceneHints& hints, const Lens& lens) {
   const bool own_size = !options.size_given && lens.size_px.x > 0;
   const glm::ivec2 size_px = own_size ? lens.size_px : parse_size("--size", options.size);
   const float fov_y_rad =
@@ -122,10 +123,12 @@ Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& le
   }
   Camera camera = lens.known() && !options.view_given() ? make_camera(lens, size_px)
                                                         : make_camera({}, size_px, focal_px);
-  camera.near_z = options.near_z.value_or(hinted_near_z);
+  camera.near_z = options.near_z.value_or(hints.near_z);
   if (!options.clip.empty()) {
     const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
-    camera.clip = {glm::vec3(plane[0], plane[1], plane[2]), static_cast<float>(plane[3])};
+    const glm::dvec3 normal(plane[0], plane[1], plane[2]);
+    camera.clip = {glm::vec3(normal),
+                   static_cast<float>(plane[3] - glm::dot(normal, hints.origin))};
     if (camera.clip.normal == glm::vec3(0.0f))
       throw InputError("--clip", "", "has a normal of 0, which is not a direction",
                        "NX,NY,NZ points to what is left out, like 0,1,0");
@@ -133,14 +136,14 @@ Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& le
   return camera;
 }
 
-std::vector<Camera> make_lenses(const LensOptions& options, float hinted_near_z,
+std::vector<Camera> make_lenses(const LensOptions& options, const SceneHints& hints,
                                 const std::string& file, const std::vector<Lens>& lenses) {
-  if (lenses.empty()) return {make_lens(options, hinted_near_z)};
+  if (lenses.empty()) return {make_lens(options, hints)};
   const Lens& first = lenses.front();
   if (!options.size_given &&
       !std::ranges::all_of(lenses, [&](const Lens& lens) { return lens.size_px == first.size_px; }))
     throw InputError(file, "", "its pictures have several sizes", "choose one with --size");
-  if (options.view_given()) return {make_lens(options, hinted_near_z, first)};
+  if (options.view_given()) return {make_lens(options, hints, first)};
   const auto note = [&](const std::string& text) {
     fmt::print(stderr, "note: {}: {}\n", printable(file), text);
   };
@@ -161,7 +164,7 @@ std::vector<Camera> make_lenses(const LensOptions& options, float hinted_near_z,
                          ? fmt::format(", and {} others without theirs", distortions.size() - 1)
                          : ""));
   std::vector<Camera> cameras;
-  for (const Lens& lens : lenses) cameras.push_back(make_lens(options, hinted_near_z, lens));
+  for (const Lens& lens : lenses) cameras.push_back(make_lens(options, hints, lens));
   const bool alike = std::ranges::all_of(
       cameras, [&](const Camera& camera) { return same_lens(camera, cameras.front()); });
   if (alike) cameras.resize(1);

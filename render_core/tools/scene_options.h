@@ -57,13 +57,14 @@ struct LensOptions {
 void add_lens_options(CLI::App& command, LensOptions& options);
 
 /// `lens` gives what the options leave open, as far as it is known. Without --near the
-/// near plane is `hinted_near_z`. Throws InputError.
-Camera make_lens(const LensOptions& options, float hinted_near_z, const Lens& lens = {});
+/// near plane is that of the hints. The clip plane counts from the hints' origin, though the
+/// option counts from the file's 0. Throws InputError.
+Camera make_lens(const LensOptions& options, const SceneHints& hints, const Lens& lens = {});
 
 /// The cameras of the poses of a path that `file` describes, without their poses. One, where the
 /// path has one lens or none, or where the options tell the field of view. Says on stderr what
 /// people should know about the lenses. Throws InputError where a lens cannot be drawn with.
-std::vector<Camera> make_lenses(const LensOptions& options, float hinted_near_z,
+std::vector<Camera> make_lenses(const LensOptions& options, const SceneHints& hints,
                                 const std::string& file, const std::vector<Lens>& lenses);
 
 /// "1920x1080" -> (1920, 1080); sides of 1…max_image_side_px. `flag` names the source in errors.

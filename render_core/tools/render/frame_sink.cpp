@@ -38,7 +38,7 @@ void write_npy(const std::filesystem::path& path, glm::ivec2 size_px,
 }
 
 void write_picture(const std::filesystem::path& path, const FrameView& frame,
-                   const FrameLayers& layers, const Camera& camera) {
+                   const FrameLayers& layers, const PictureCamera& camera) {
   write_png(path, copy_image(frame), layers.alpha, {}, {camera_key, camera_text(camera)});
   if (!layers.depth.empty())
     write_npy(std::filesystem::path(path).replace_extension(".npy"), frame.size_px, layers.depth);
@@ -46,22 +46,27 @@ void write_picture(const std::filesystem::path& path, const FrameView& frame,
 
 class PngSink final : public FrameSink {
  public:
-  explicit PngSink(std::filesystem::path path) : path_(std::move(path)) {}
+  explicit PngSink(const FrameSinkSettings& settings)
+      : path_(settings.path), origin_(settings.origin) {}
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
   void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
-    write_picture(path_, frame, layers, camera);
+    write_picture(path_, frame, layers, {camera, origin_});
   }
   void finish() override {}
 
  private:
   std::filesystem::path path_;
+  glm::dvec3 origin_;
 };
 
 class PngFolderSink final : public FrameSink {
  public:
   explicit PngFolderSink(const FrameSinkSettings& settings)
-      : folder_(settings.path), number_(settings.first_frame), names_(settings.names) {
+      : folder_(settings.path),
+        origin_(settings.origin),
+        number_(settings.first_frame),
+        names_(settings.names) {
     std::error_code error;
     std::filesystem::create_directories(folder_, error);
     if (error) throw InputError(folder_.string(), "", error.message(), "a folder is needed");
@@ -71,12 +76,13 @@ class PngFolderSink final : public FrameSink {
   void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
     const std::string name =
         names_.empty() ? fmt::format("frame_{:06}", number_++) : names_.at(written_++);
-    write_picture(folder_ / (name + ".png"), frame, layers, camera);
+    write_picture(folder_ / (name + ".png"), frame, layers, {camera, origin_});
   }
   void finish() override {}
 
  private:
   std::filesystem::path folder_;
+  glm::dvec3 origin_;
   std::size_t number_, written_ = 0;
   std::vector<std::string> names_;
 };
@@ -166,7 +172,7 @@ bool is_video(const std::filesystem::path& path) {
 
 std::unique_ptr<FrameSink> make_frame_sink(const FrameSinkSettings& settings) {
   const std::string extension = settings.path.extension().string();
-  if (extension == ".png") return std::make_unique<PngSink>(settings.path);
+  if (extension == ".png") return std::make_unique<PngSink>(settings);
   if (is_video(settings.path)) {
     if (settings.layers) {
       throw InputError("--alpha, --depth", "", "a video holds colours only",

@@ -112,6 +112,7 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
                                .fps = setup.fps,
                                .first_frame = setup.first,
                                .names = picture_names(setup.names),
+                               .origin = setup.scene.hints.origin,
                                .layers = options.alpha || options.depth});
   if (options.out.ends_with(".png") && setup.poses.size() != 1) {
     throw InputError(options.out, "", fmt::format("one picture for {} frames", setup.poses.size()),

@@ -42,7 +42,7 @@ struct LoadedScene {
 };
 
 LoadedScene load_for_trace(const TraceOptions& options, bool quiet) {
-  (void)make_lens(options.lens, 1.0f);  // a mistake appears before a large scene is read
+  (void)make_lens(options.lens, {});  // a mistake appears before a large scene is read
   LoadedScene loaded{load_scene(options.scene, 0, quiet), {}};
   loaded.bounds = robust_bounds(loaded.scene.cloud).value_or(Bounds{});
   return loaded;
@@ -54,7 +54,7 @@ TraceCheck check(const TraceOptions& options, const LoadedScene& loaded,
   ThreadPool pool;
   const Lens lens = path.lenses.empty() ? Lens{} : path.lenses.front();
   return check_trace(trajectory, loaded.scene.cloud.mean, {loaded.bounds, loaded.scene.hints},
-                     make_lens(options.lens, loaded.scene.hints.near_z, lens), pool);
+                     make_lens(options.lens, loaded.scene.hints, lens), pool);
 }
 
 void print_checked(const std::string& file, const TraceCheck& result) {

@@ -59,7 +59,7 @@ RenderSetup make_journey(const Trajectory& trace, double rate_hz, const WindowsO
   setup.samples = trace;
   setup.poses = resample(trace, rate_hz);
   setup.fps = rate_hz;
-  setup.camera = make_lens(options.lens, 0.0f);
+  setup.camera = make_lens(options.lens, {});
   setup.predictor = predictor_settings(pipeline);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
   setup.view = view_settings(pipeline);
@@ -110,7 +110,7 @@ PaperTable windows_table(const WindowsOptions& options, const std::vector<Trajec
 }
 
 void windows(const WindowsOptions& options, bool quiet) {
-  (void)make_lens(options.lens, 0.0f);
+  (void)make_lens(options.lens, {});
   const std::vector<Rule> all_rules = rules(options);
   for (const Rule& rule : all_rules) (void)with_flags(options.pipeline, rule.flags);
   std::vector<Trajectory> traces;

@@ -21,6 +21,7 @@
 
 #include "render_core/image/png.h"
 #include "render_core/motion/trajectory.h"
+#include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/files/save_scene.h"
 #include "tests/render_core/tools/run_catgs_render.h"
 #include "tests/support/read_rgba.h"
@@ -319,6 +320,47 @@ TEST_F(Frames, CompareNotesOtherCameras) {
     std::filesystem::copy_file(path("a.png"), path(to));
   std::filesystem::copy_file(path("b.png"), path("y/2.png"));
   EXPECT_THAT(compare(path("x") + " " + path("y")), HasSubstr("note: 1 pictures were drawn by"));
+}
+
+/// A trace and a clip plane in each scene's file coordinates give what they give near 0.
+TEST_F(Frames, FarScenesClipAndTellCamerasInFileCoordinates) {
+  const glm::dvec3 there(500123.0, 5412345.0, 431.0);
+  const std::string by = fmt::format("--translate={},{},{}", there.x, there.y, there.z);
+  ASSERT_EQ(run(fmt::format("convert {} {} {}", path("wall.ply"), path("far.ply"), by)).exit_code,
+            0);
+  const std::string crop = fmt::format("--crop={},{},{},{},{},{}", there.x + 1.4, there.y + 0.5,
+                                       there.z, there.x + 3, there.y + 3, there.z + 5);
+  ASSERT_EQ(run(fmt::format("convert {} {} {}", path("far.ply"), path("part.ply"), crop)).exit_code,
+            0);
+  ASSERT_EQ(run(fmt::format("convert {} {}", path("far.ply"), path("far.tree"))).exit_code, 0);
+  write_tum(path("far.tum"), {{0, {}}}, there);
+  const auto shown = [&](const std::string& in, const std::string& trace, double d,
+                         const std::string& more = "") {
+    const std::string out = path(fmt::format("{}_{}.png", in, d));
+    const Outcome done = run(fmt::format(
+        "--quiet frames {} --size 64x48 --focal-px 40 --near 0.1 --renderer cpu --trace {} "
+        "--clip=1,0,0,{:.3f} --out {} {}",
+        path(in), path(trace), d, out, more));
+    EXPECT_EQ(done.exit_code, 0) << done.out;
+    return out;
+  };
+  const std::string near = shown("wall.ply", "still.tum", 1.25);
+  const std::string whole = shown("wall.ply", "still.tum", 100.0);
+  const std::string clipped = shown("far.ply", "far.tum", there.x + 1.25);
+  const std::string pages = shown("far.tree", "far.tum", there.x + 1.25, "--detail 0");
+  const auto alike = [&](const std::string& a, const std::string& b, const std::string& flag) {
+    return run(fmt::format("compare {} {} {}", a, b, flag)).exit_code == 0;
+  };
+  EXPECT_TRUE(alike(near, clipped, "--require-psnr 50"));
+  EXPECT_TRUE(alike(near, pages, "--require-psnr 30"));
+  EXPECT_FALSE(alike(near, whole, "--require-psnr 30")) << "the plane cuts the wall";
+
+  // Both copies are drawn from one place in the file's coordinates, about origins of their own.
+  const std::string part = shown("part.ply", "far.tum", there.x + 100);
+  EXPECT_NE(load_scene(path("part.ply")).hints.origin, load_scene(path("far.ply")).hints.origin);
+  EXPECT_TRUE(alike(clipped, part, "--require-same-cameras"));
+  EXPECT_FALSE(alike(near, clipped, "--require-same-cameras"));
+  EXPECT_THAT(run(fmt::format("compare {} {}", near, clipped)).out, HasSubstr("5.44e+06 units"));
 }
 
 TEST_F(Frames, APanoramaShowsAllAround) {
