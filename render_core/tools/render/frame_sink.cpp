@@ -1,6 +1,7 @@
 #include "render_core/tools/render/frame_sink.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
@@ -143,27 +144,46 @@ class Mp4Sink final : public FrameSink {
 
 }  // namespace
 
-std::vector<std::string> picture_names(const std::vector<std::string>& of_path) {
-  const auto without_extension = [](const std::filesystem::path& file) {
-    const std::string extension = file.extension().string();  // that of "frame.0001" is a number
-    const bool is_word =
-        std::ranges::any_of(extension, [](unsigned char c) { return std::isalpha(c) != 0; });
-    return is_word ? std::filesystem::path(file).replace_extension() : file;
-  };
+namespace {
+
+/// The path without the extension of a picture; that of "frame.0001" or "image.v2" is a part of it.
+std::filesystem::path without_extension(std::string name) {
+  std::ranges::replace(name, '\\', '/');  // of Windows
+  const auto file = std::filesystem::path(name).lexically_normal();
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  static constexpr std::array<std::string_view, 8> of_pictures = {".png", ".jpg",  ".jpeg", ".webp",
+                                                                  ".tif", ".tiff", ".exr",  ".bmp"};
+  return std::ranges::find(of_pictures, extension) != of_pictures.end()
+             ? std::filesystem::path(file).replace_extension()
+             : file;
+}
+
+}  // namespace
+
+PictureNames picture_names(const std::vector<std::string>& of_path) {
+  PictureNames result;
   for (const bool whole : {false, true}) {
-    std::vector<std::string> names;
-    for (const std::string& name : of_path) {
-      const auto file = without_extension(std::filesystem::path(name).lexically_normal());
-      names.push_back(whole ? file.string() : file.filename().string());
-      std::ranges::replace(names.back(), '/', '_');
+    result = {};
+    std::set<std::string> different;
+    for (const std::string& of_picture : of_path) {
+      const auto file = without_extension(of_picture);
+      std::string name = whole ? file.string() : file.filename().string();
+      std::ranges::replace(name, '/', '_');
+      const bool usable =
+          !name.empty() && name.size() <= 200 && name.front() != '.' && printable(name) == name;
+      if (usable && different.insert(name).second) {
+        result.names.push_back(name);
+        continue;
+      }
+      result = {{},
+                fmt::format("\"{}\" {}", printable(of_picture.substr(0, 80)),
+                            usable ? "is the name of two" : "is no name for a file")};
+      break;
     }
-    const bool usable = std::ranges::all_of(names, [](const std::string& name) {
-      return !name.empty() && name.size() <= 200 && name.front() != '.' && printable(name) == name;
-    });
-    const std::set<std::string_view> different(names.begin(), names.end());
-    if (usable && different.size() == names.size()) return names;
+    if (result.problem.empty()) break;
   }
-  return {};
+  return result;
 }
 
 bool is_video(const std::filesystem::path& path) {

@@ -36,9 +36,14 @@ struct FrameSinkSettings {
   bool layers = false;               // frames come with layers, which only pictures can hold
 };
 
+struct PictureNames {
+  std::vector<std::string> names;  // different ones; empty: frame numbers are used
+  std::string problem{};           // why they are
+};
+
 /// Names of files for the pictures of a path, as compare takes them: without folders and extension,
 /// or with underscores for slashes where those would meet. Empty where they cannot be told apart.
-std::vector<std::string> picture_names(const std::vector<std::string>& of_path);
+PictureNames picture_names(const std::vector<std::string>& of_path);
 
 bool is_video(const std::filesystem::path& path);
 

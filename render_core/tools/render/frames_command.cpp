@@ -107,11 +107,16 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
     if (options.checked_pixels > 0) return nullptr;
     throw InputError("--out", "", "is missing", "a folder, or a file .png, .y4m or .mp4");
   }
+  const auto [names, problem] = picture_names(setup.names);
+  const bool is_folder = !options.out.ends_with(".png") && !is_video(options.out);
+  const bool has_names = std::ranges::any_of(setup.names, [](const auto& n) { return !n.empty(); });
+  if (is_folder && has_names && !problem.empty())
+    fmt::print(stderr, "note: pictures have frame numbers, since {}\n", problem);
   auto sink = make_frame_sink({.path = options.out,
                                .size_px = setup.camera.size_px,
                                .fps = setup.fps,
                                .first_frame = setup.first,
-                               .names = picture_names(setup.names),
+                               .names = names,
                                .origin = setup.scene.hints.origin,
                                .layers = options.alpha || options.depth});
   if (options.out.ends_with(".png") && setup.poses.size() != 1) {

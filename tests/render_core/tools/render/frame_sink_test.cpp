@@ -68,25 +68,36 @@ TEST_F(FrameSinkTest, AFolderGetsNumberedPictures) {
 
 TEST_F(FrameSinkTest, PicturesHaveTheNamesOfTheirPath) {
   using Names = std::vector<std::string>;
-  const auto folder = make_frame_sink({.path = folder_ / "named",
-                                       .size_px = {16, 8},
-                                       .names = picture_names({"./test/r_0", "images/b.1.JPG"})});
+  const auto folder =
+      make_frame_sink({.path = folder_ / "named",
+                       .size_px = {16, 8},
+                       .names = picture_names({"./test/r_0", "images/b.1.JPG"}).names});
   HostImage image;
   for (int i = 0; i < 2; ++i) folder->write(grey_frame(image, folder->format(), {16, 8}), {}, {});
   EXPECT_TRUE(std::filesystem::exists(folder_ / "named/r_0.png"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "named/b.1.png"));
-  for (const auto& [of_path, names] : std::vector<std::pair<Names, Names>>{
+  struct Case {
+    Names of_path, names;
+    std::string problem{};
+  };
+  for (const auto& [of_path, names, problem] : std::vector<Case>{
            {{"a/1.jpg", "b/1.jpg"}, {"a_1", "b_1"}},
            {{"frame.0001", "frame.0002"}, {"frame.0001", "frame.0002"}},
+           {{"img.v0", "img.v1"}, {"img.v0", "img.v1"}},
+           {{R"(C:\pics\im0.jpg)"}, {"im0"}},
            {{"../../etc/passwd", "x"}, {"passwd", "x"}},
-           {{"a.png", "a.jpg"}, {}},
-           {{"", "b"}, {}},
-           {{".."}, {}},
-           {{"a\nb"}, {}},
-           {{std::string("a\0b", 3)}, {}},
-           {{std::string(300, 'a')}, {}},
-       })
-    EXPECT_EQ(picture_names(of_path), names) << of_path[0];
+           {{"a.png", "a.jpg"}, {}, R"("a.jpg" is the name of two)"},
+           {{"c/1", "d/1", "c_1"}, {}, R"("c_1" is the name of two)"},
+           {{"", "b"}, {}, R"("" is no name for a file)"},
+           {{".."}, {}, R"(".." is no name for a file)"},
+           {{"a\nb"}, {}, R"("a\x0ab" is no name for a file)"},
+           {{std::string("a\0b", 3)}, {}, R"("a\x00b" is no name for a file)"},
+           {{std::string(300, 'a')}, {}, '"' + std::string(80, 'a') + "\" is no name for a file"},
+       }) {
+    const PictureNames found = picture_names(of_path);
+    EXPECT_EQ(found.names, names) << of_path[0];
+    EXPECT_EQ(found.problem, problem);
+  }
 }
 
 TEST_F(FrameSinkTest, Y4mIsTaggedAndComplete) {
