@@ -39,9 +39,10 @@ static_assert(sizeof(PackedGeometry) == 32);
 /// The units of the numbers in a cluster's records.
 struct alignas(16) PackedUnits {
   float factor;  // of the cluster's largest Gaussian, a power of two
-  // For the harmonics of degree 1, 2 and 3: the largest of the median Gaussian is 127 / 2^15, or a
-  // power of two less, so that the highest octave holds the cluster's largest. So no Gaussian's
-  // extremes decide how finely the others are stored.
+  // For the harmonics of degree 1, 2 and 3: the largest of the median Gaussian is 127 / 2^15. No
+  // unit is under a quarter of another, and all are a power of two larger where the highest octave
+  // would not hold the cluster's largest. So no Gaussian's extremes decide how finely the others
+  // are stored.
   float sh[3];
 };
 
@@ -92,8 +93,8 @@ CATGS_HD inline float unpack_log2_opacity(std::uint32_t level) {
 
 /// The four low bits of an opacity's level are also those of its harmonics' octave: the power of
 /// two that a Gaussian's units are larger than the cluster's by. It is the least one that holds the
-/// harmonics of all degrees, so an extreme one is coarse for its own Gaussian alone. The
-/// other twelve bits bring the level as near to the opacity as they can: within 0.07 %, at the
+/// harmonics of all degrees, so an extreme one is coarse for its own Gaussian alone. The other
+/// twelve bits bring the level as near to the opacity as they can: within 0.07 %, at the
 /// opaque end 0.13 %. Without higher harmonics all bits are the opacity's.
 constexpr std::uint32_t sh_octave_mask = 15;
 constexpr int least_sh_octave = -6;

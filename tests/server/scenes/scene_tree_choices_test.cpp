@@ -35,7 +35,7 @@ class SceneLevelsTest : public SceneTreesTest {
                                                           {"tree", {{"lods", lods}}}}
                                                .dump());
   }
-  /// What was kept of the only comparison; empty: nothing.
+  /// Returns what was kept of the only comparison; empty: nothing.
   [[nodiscard]] std::string choice() const {
     const auto files = kept(".choice");
     return files.empty() ? "" : bytes_in(files[0]);

@@ -6,7 +6,7 @@ import { straight } from './walker';
 
 const diagonal = Math.SQRT2;
 const straight_on = 1.2; // weight of what is left of the way (Pohl 1970): the search takes a third of the time
-const nodes_a_breath = 64;
+const nodes_a_yield = 64;
 const most_skipped = 256; // places that a straight line is tried over
 
 /** A binary heap of places, the least cost first. */
@@ -153,7 +153,7 @@ export async function find_path(
   const beside = [-1, -1, -1, -1];
   const yields = new Yields();
   for (let k = 0; !open.empty && state[end] !== State.done; ++k) {
-    if (k % nodes_a_breath === 0) {
+    if (k % nodes_a_yield === 0) {
       await yields.if_due();
       if (!wanted()) return [];
     }
