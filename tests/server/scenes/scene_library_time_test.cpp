@@ -32,6 +32,26 @@ TEST_F(SceneLibraryTime, APosterStaysWhenItsSceneGoes) {
   });
 }
 
+TEST_F(SceneLibraryTime, SavedTitleStaysListedWhenItsSceneGoes) {
+  {
+    auto saved = std::make_shared<SceneEntry>(*load("a"));
+    saved->facts.about.title = "Saved";
+    library_->revise(id("a"), std::move(saved));
+  }
+  load("b");
+  tick(60s);
+  visit("b");
+  load("c");
+  EXPECT_FALSE(in_memory("a"));
+  EXPECT_EQ(listed("a").title, "Saved");
+  save_scene(random_cloud(10, 0), folder_ / "d.ply");
+  run_until([&] {
+    tick(31s);
+    return has("d");
+  });
+  EXPECT_EQ(listed("a").title, "Saved") << "the folder was looked at again";
+}
+
 TEST_F(SceneLibraryTime, APreparedSceneIsThereWhenItsVisitorComes) {
   library_->prepare(id("a"), now_);
   run_until([&] { return in_memory("a"); });
