@@ -77,6 +77,28 @@ TEST_F(SceneTreesTest, AChangedSceneGetsAnotherTree) {
   EXPECT_EQ(built(), 2);
 }
 
+TEST_F(SceneTreesTest, TreeOfReplacedFilesDoesNotStay) {
+  start();
+  build("a");
+  start();
+  const auto wait_for_loader = [&] {
+    std::promise<void> idle;
+    Background::Jobs jobs(background_);
+    jobs.start(lanes.scenes, Priority::low, [&](const auto&) { idle.set_value(); });
+    idle.get_future().wait();
+  };
+  replace("scenes/a.ply", 2000);
+  library_->on_tick(now_ += 31s);
+  wait_for_loader();  // the scan has seen the new file, and nobody knows it yet
+  EXPECT_TRUE(awaited("a"));
+  wait_for_loader();
+  run_until([&] {
+    const auto answer = library_->want(id("a"), now_);
+    return std::holds_alternative<Entry>(answer) &&
+           std::get<Entry>(answer)->facts.gaussians == 2000;
+  });
+}
+
 TEST_F(SceneTreesTest, ADamagedTreeIsBuiltAgain) {
   start();
   build("a");
