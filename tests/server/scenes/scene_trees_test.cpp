@@ -359,5 +359,22 @@ TEST_F(SceneTreesTest, ASaveDuringTheBuildIsKept) {
   EXPECT_TRUE(entry("a")->in_pages);
 }
 
+TEST_F(SceneTreesTest, PosterOfASavedViewStaysWhenTheTreeComes) {
+  start();
+  const Entry seen = visit("a");
+  const auto save = [&](const SceneEntry& entry, const char* poster) {
+    auto saved = std::make_shared<SceneEntry>(entry);
+    saved->facts.start_pose.position = {0, 0, -9};
+    saved->poster = std::make_shared<const std::string>(poster);
+    library_->revise(id("a"), saved);
+  };
+  run_until([&] { return built() == 1; });
+  save(*seen, "before");
+  run_until([&] { return entry("a")->in_pages; });
+  EXPECT_TRUE(*entry("a")->poster == "before") << "the tree's shows the view before";
+  save(*seen, "after");
+  EXPECT_TRUE(*entry("a")->poster == "after") << "it was drawn meanwhile";
+}
+
 }  // namespace
 }  // namespace catgs::test
