@@ -161,7 +161,14 @@ std::shared_ptr<const SceneEntry> load_scene(
   options.up = axis_named(config.up);
   options.progress = progress;
   options.keep_view = keep.view;
+  const std::filesystem::path& sidecar = location.hints.sidecar;
+  const std::optional<std::string> before = sidecar_text(sidecar);
   auto [tree, scene] = load(location, representation, config, std::move(options));
+  // Somebody may replace it during the load. Hints, tours and tag are those of one text.
+  const std::optional<std::string> text = sidecar_text(sidecar);
+  if (text != before)
+    use_sidecar(text ? sidecar_in(*text, sidecar, scene.hints.origin) : Sidecar(),
+                sidecar.filename().string(), scene.hints);
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
@@ -174,8 +181,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);
   if (location.format != nullptr) {
-    entry->sidecar = location.hints.sidecar;
-    const std::optional<std::string> text = sidecar_text(entry->sidecar);
+    entry->sidecar = sidecar;
     if (text) entry->sidecar_tag = etag_of(*text);
     entry->tours = ToursAnswers(tours_of(entry->sidecar, text, config.media_origins));
   }
@@ -185,7 +191,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
   const auto draw = [&] { return make_poster(*entry->renderer, entry->facts); };
-  entry->poster = keep.poster ? keep.poster(draw) : draw();
+  entry->poster = keep.poster && text == before ? keep.poster(draw) : draw();
   log_info({.event = "scene_loaded", .scene = entry->facts.scene_id},
            "scene {}: {} Gaussians, {}, {}{:.1f} MB per device, view from {}",
            entry->facts.scene_id, entry->facts.gaussians, scene.format,

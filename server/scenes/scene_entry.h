@@ -34,7 +34,7 @@ struct SceneEntry {
 };
 
 /// The scene of `entry`, as its author describes it now, drawn by the renderer of `other`.
-inline std::shared_ptr<const SceneEntry> redrawn(const SceneEntry& entry, const SceneEntry& other) {
+inline std::shared_ptr<SceneEntry> redrawn(const SceneEntry& entry, const SceneEntry& other) {
   auto scene = std::make_shared<SceneEntry>(entry);
   scene->facts.gaussians = other.facts.gaussians;
   scene->renderer = other.renderer;
@@ -42,7 +42,6 @@ inline std::shared_ptr<const SceneEntry> redrawn(const SceneEntry& entry, const 
   scene->coarse = other.coarse;
   scene->renderer_text = other.renderer_text;
   scene->surface = other.surface;
-  scene->poster = other.poster;
   return scene;
 }
 

@@ -27,7 +27,7 @@ struct FoundScene {
   std::string name;  // for people
   std::string id;
   SceneSize size;
-  SceneAbout about;  // of its sidecar, when the scene was found
+  SceneAbout about;  // of its sidecar, when these files were found
   /// The stamp of the file, and of those that it has beside it or directly in its folder. A new
   /// value means a new scene.
   FilesStamp stamp{};

@@ -46,6 +46,8 @@ void SceneIndex::merge(std::vector<FoundScene> found,
       // Visitors still see the former scene, and no file tells its walkable area any more.
       record.walkable_area = record.entry ? std::make_shared<const WalkableArea>() : nullptr;
       record.retry_at.reset();
+    } else {
+      scene.about = std::move(record.found.about);  // authors may have saved it since
     }
     record.found = std::move(scene);
   }

@@ -53,11 +53,11 @@ void SceneMemory::load_now(const std::string& id) {
     throw InputError("--scene-memory", {}, refusal(answer, id, trees_.bytes_of(found)).message);
   residency_.next(now, use_of_);
   auto entry = loads_.load_now(found);
-  on_loaded(id, {std::move(entry)}, now, clock_());
+  on_loaded(found, {std::move(entry)}, now, clock_());
 }
 
 void SceneMemory::failed_now(const std::string& id, const std::string& error) {
-  on_loaded(id, {nullptr, error}, clock_(), clock_());
+  on_loaded(index_.records().at(id).found, {nullptr, error}, clock_(), clock_());
 }
 
 SceneAnswer SceneMemory::want(const std::string& id, TimePoint now) {
@@ -165,8 +165,8 @@ bool SceneMemory::carry_out(const SceneResidency::Step& step, SceneLoader::For w
     residency_.failed(step.load);  // its tree was lost; visitors ask again
     return false;
   }
-  loads_.load(found, *representation, whom, [this, id = step.load, now](LoadedScene loaded) {
-    on_loaded(id, std::move(loaded), now, clock_());
+  loads_.load(found, *representation, whom, [this, found, now](LoadedScene loaded) {
+    on_loaded(found, std::move(loaded), now, clock_());
   });
   return true;
 }
@@ -186,16 +186,18 @@ void SceneMemory::release(const std::string& id) {
   loads_.free_later(std::move(entry));
 }
 
-void SceneMemory::on_loaded(const std::string& id, LoadedScene loaded, TimePoint started,
+void SceneMemory::on_loaded(const FoundScene& found, LoadedScene loaded, TimePoint started,
                             TimePoint now) {
+  const std::string& id = found.id;
   SceneRecord* const record = index_.find(id);
+  const bool other_tree = record && record->found.tree != found.tree;
   if (!loaded.entry || !record) {
     residency_.failed(id);
     std::erase(unvisited_, id);
     if (record && (loaded.gave_way || loaded.unusable_tree)) record->poster_tried = false;
     if (loaded.gave_way) return start_next(now);
     if (loaded.unusable_tree) {
-      if (record) trees_.discard(record->found, loaded.error);
+      if (!other_tree) trees_.discard(found, loaded.error);
       return start_next(now);  // visitors ask again
     }
     log_error({.event = "scene_load_failed", .scene = id}, "scene {} is not loaded: {}", id,
@@ -212,7 +214,9 @@ void SceneMemory::on_loaded(const std::string& id, LoadedScene loaded, TimePoint
   metrics_.scenes_loaded.Increment();
   residency_.loaded(id, need, now);
   record->entry = std::move(loaded.entry);
-  record->walkable_area.reset();
+  // Files are read as they are, and a tree is of the files before.
+  record->outdated = other_tree && record->entry->in_pages;
+  record->walkable_area = record->outdated ? std::make_shared<const WalkableArea>() : nullptr;
   publish();
   start_next(now);
 }

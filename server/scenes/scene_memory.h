@@ -57,7 +57,8 @@ class SceneMemory {
   void drop_unvisited();
   /// Returns false if nothing is loaded, as the scene's tree is not there any more.
   bool carry_out(const SceneResidency::Step& step, SceneLoader::For whom, TimePoint now);
-  void on_loaded(const std::string& id, LoadedScene loaded, TimePoint started, TimePoint now);
+  /// `found`: what was loaded. The index may have found other files meanwhile.
+  void on_loaded(const FoundScene& found, LoadedScene loaded, TimePoint started, TimePoint now);
   void release(const std::string& id);
 
   const ServerConfig& config_;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/base/log_event.h"
+#include "server/scenes/poster.h"
 
 namespace catgs {
 namespace {
@@ -117,7 +118,10 @@ void SceneRedrawing::on_loaded(const std::string& id, const FoundScene& found, L
   if (loaded.compared && loaded.compared->tree_is_good() != loaded.entry->in_pages)
     return loader_.free_later(std::move(loaded.entry));
   residency_.resize(id, need_of(*record->entry).with(need_of(*loaded.entry)));
-  record->former = std::exchange(record->entry, redrawn(*record->entry, *loaded.entry));
+  auto drawn = redrawn(*record->entry, *loaded.entry);
+  // An author may have saved another first view since the load began.
+  if (same_poster(drawn->facts, loaded.entry->facts)) drawn->poster = loaded.entry->poster;
+  record->former = std::exchange(record->entry, std::move(drawn));
   record->tree_lost = false;
   record->recall();  // jobs continue with the new representation
   changed_ = true;

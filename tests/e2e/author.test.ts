@@ -7,6 +7,7 @@ import type { Pose } from '#client/camera/eye';
 import { barriers } from './support/axe';
 import { keep_screenshot, open, windows, type WatchedPage } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
+import { start_delay_proxy } from './support/delay_proxy';
 import {
   access_token,
   catgs_render,
@@ -275,6 +276,25 @@ describe('an author', () => {
     await panel.waitFor();
     expect(distance(before, await pose_of(page))).toBeLessThan(1e-3);
     expect(await page.evaluate(() => document.activeElement?.id)).toBe('author-preview');
+  });
+
+  it('saves what was added right before, however late the server answers', async () => {
+    const port = await start_delay_proxy(workshop.port, 300);
+    const address = `http://127.0.0.1:${port}/?author#token=${access_token('author')}`;
+    const { page } = await open(address, windows.desktop);
+    await page.getByRole('region', { name: 'Make a tour' }).waitFor();
+    const stops = page.locator('#author-stops > li');
+    const before = await stops.count();
+    const count_of = (json: string): number =>
+      (JSON.parse(json) as { tours: { stops: unknown[] }[] }).tours[0]!.stops.length;
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByRole('button', { name: 'Save to the server' }).click();
+    await page.getByText('Saved. Visitors see it').waitFor();
+    expect(count_of(readFileSync(sidecar, 'utf8'))).toBe(before + 1);
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: 'Add a stop here' }).click();
+    await page.getByRole('button', { name: 'Download the file' }).click();
+    expect(count_of(readFileSync(await (await download).path(), 'utf8'))).toBe(before + 2);
   });
 
   it('learns when another one saved meanwhile, and replaces that version on purpose only', async () => {

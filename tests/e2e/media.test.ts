@@ -1,5 +1,5 @@
 // Pictures, films and sounds of a tour: an author adds them, and visitors see and hear them.
-import { unlinkSync, writeFileSync } from 'node:fs';
+import { readFileSync, unlinkSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { BrowserContextOptions, Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -151,6 +151,8 @@ describe('an author', () => {
     await page.getByRole('button', { name: 'Save to the server' }).click();
     await page.getByText('Saved. Visitors see it').waitFor();
     expect(errors.filter((error) => !error.includes('409'))).toEqual([]); // of the drawing
+    const saved: unknown = JSON.parse(readFileSync(path.join(folder, 'hall.json'), 'utf8'));
+    expect(saved).toHaveProperty('tours.0.stops.length', 2); // visitors get these
   });
 });
 

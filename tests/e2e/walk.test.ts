@@ -225,19 +225,25 @@ describe('a visit that begins inside', () => {
     for (let k = 0; k < 3 && (await mode(page)) !== 'Orbit'; ++k) await page.keyboard.press('KeyM');
     expect(await mode(page)).toBe('Orbit');
     const begin = await pose_of(page);
+    let farthest = 0; // where a drag or a key ends depends on when the server says what is ahead
+    const look = async (): Promise<void> => {
+      const pose = await pose_of(page);
+      expect_inside(pose);
+      farthest = Math.max(farthest, distance(begin, pose));
+    };
     for (const by of [
       [300, 0],
       [-500, 40],
       [200, -150],
     ] as const) {
       await drag(page, windows.desktop, by);
-      expect_inside(await pose_of(page));
+      await look();
     }
-    expect(distance(begin, await pose_of(page))).toBeGreaterThan(0.1);
     for (const key of ['ArrowLeft', 'KeyS', 'KeyD', 'KeyE']) {
       await hold(page, key, 2000);
-      expect_inside(await pose_of(page));
+      await look();
     }
+    expect(farthest).toBeGreaterThan(0.5);
     await keep_screenshot(page, 'orbit-inside');
   });
 });

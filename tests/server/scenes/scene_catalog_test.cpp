@@ -36,14 +36,15 @@ class SceneCatalog : public FolderTest {
     save_scene(random_cloud(30, 0), folder_ / "plain.splat");
     config_.scenes = {folder_ / "streamed", folder_ / "plain.splat"};
   }
-  std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneRepresentation& form = {}) {
+  std::shared_ptr<const SceneEntry> load(std::size_t scene, const SceneRepresentation& form = {},
+                                         const KeepDerived& keep = {}) {
     return load_scene(
         locate_scenes(config_).at(scene), form, [](const std::string& name) { return name; },
         config_,
         {.kind = RendererKind::cpu,
          .pool = std::make_shared<ThreadPool>(2),
          .pages = std::make_shared<PagePools>(tree_memory(config_))},
-        2);
+        2, {}, keep);
   }
   std::uint64_t gaussians(std::size_t scene) { return load(scene)->facts.gaussians; }
 
@@ -86,6 +87,17 @@ TEST_F(SceneCatalog, ReadsATreeInPages) {
   EXPECT_NE(entry->poster, nullptr);
   config_.scenes = {folder_ / "plain.splat"};
   EXPECT_FALSE(load(0)->in_pages);
+}
+
+TEST_F(SceneCatalog, SidecarThatIsReplacedDuringTheLoadCountsAsAWhole) {
+  const std::string after = R"({"title": "After"})";
+  write("plain.json", R"({"title": "Before"})");
+  const auto entry = load(1, {}, {.view = [&](const auto& estimate) {
+                            write("plain.json", after);
+                            return estimate();
+                          }});
+  EXPECT_EQ(entry->facts.title, "After");
+  EXPECT_EQ(entry->sidecar_tag, etag_of(after));
 }
 
 TEST_F(SceneCatalog, ReadsASceneFromATreeOfItsOwn) {

@@ -77,6 +77,28 @@ TEST_F(SceneTreesTest, AChangedSceneGetsAnotherTree) {
   EXPECT_EQ(built(), 2);
 }
 
+TEST_F(SceneTreesTest, TreeOfReplacedFilesDoesNotStay) {
+  start();
+  build("a");
+  start();
+  const auto wait_for_loader = [&] {
+    std::promise<void> idle;
+    Background::Jobs jobs(background_);
+    jobs.start(lanes.scenes, Priority::low, [&](const auto&) { idle.set_value(); });
+    idle.get_future().wait();
+  };
+  replace("scenes/a.ply", 2000);
+  library_->on_tick(now_ += 31s);
+  wait_for_loader();  // the scan has seen the new file, and nobody knows it yet
+  EXPECT_TRUE(awaited("a"));
+  wait_for_loader();
+  run_until([&] {
+    const auto answer = library_->want(id("a"), now_);
+    return std::holds_alternative<Entry>(answer) &&
+           std::get<Entry>(answer)->facts.gaussians == 2000;
+  });
+}
+
 TEST_F(SceneTreesTest, ADamagedTreeIsBuiltAgain) {
   start();
   build("a");
@@ -335,6 +357,23 @@ TEST_F(SceneTreesTest, ASaveDuringTheBuildIsKept) {
   library_->revise(id("a"), saved);
   EXPECT_EQ(entry("a")->facts.title, "Saved");
   EXPECT_TRUE(entry("a")->in_pages);
+}
+
+TEST_F(SceneTreesTest, PosterOfASavedViewStaysWhenTheTreeComes) {
+  start();
+  const Entry seen = visit("a");
+  const auto save = [&](const SceneEntry& entry, const char* poster) {
+    auto saved = std::make_shared<SceneEntry>(entry);
+    saved->facts.start_pose.position = {0, 0, -9};
+    saved->poster = std::make_shared<const std::string>(poster);
+    library_->revise(id("a"), saved);
+  };
+  run_until([&] { return built() == 1; });
+  save(*seen, "before");
+  run_until([&] { return entry("a")->in_pages; });
+  EXPECT_TRUE(*entry("a")->poster == "before") << "the tree's shows the view before";
+  save(*seen, "after");
+  EXPECT_TRUE(*entry("a")->poster == "after") << "it was drawn meanwhile";
 }
 
 }  // namespace

@@ -53,6 +53,7 @@ export class AuthorPanel {
   private made_from_: SidecarTag;
   private theirs_: SidecarTag; // tag of what somebody else saved meanwhile
   private start_: Eye | undefined; // as the page has heard
+  private points_: Promise<unknown> = Promise.resolve(); // all that edits have asked for are known
   private saved_: unknown = this.draft_.state; // the state of the draft that is saved; undefined: the scene has changed besides
 
   constructor(private readonly tools_: AuthorTools) {
@@ -200,9 +201,9 @@ export class AuthorPanel {
     by_id('author-film', HTMLDetailsElement).addEventListener('toggle', () => {
       this.open_film().catch((error: unknown) => console.warn('films cannot be ordered', error));
     });
-    on_click('author-save', () => void this.save(this.made_from_));
-    on_click('author-replace', () => void this.save(this.theirs_));
-    on_click('author-download', () => this.download());
+    on_click('author-save', () => void this.points_.then(() => this.save(this.made_from_)));
+    on_click('author-replace', () => void this.points_.then(() => this.save(this.theirs_)));
+    on_click('author-download', () => void this.points_.then(() => this.download()));
     window.addEventListener('beforeunload', (event) => {
       if (this.is_unsaved) event.preventDefault();
     });
@@ -219,11 +220,20 @@ export class AuthorPanel {
     });
   }
 
+  /** The point in the middle of the view. Saves wait for the edit that asks for it. */
+  private point_ahead(): ReturnType<Navigation['point_ahead']> {
+    const point = this.tools_.navigation.point_ahead();
+    this.points_ = this.points_.then(() => point);
+    return point;
+  }
+
   private async add(): Promise<void> {
     const eye = this.tools_.navigation.eye;
     const { edited } = this.draft_.state;
-    const marker = await this.tools_.navigation.point_ahead();
-    if (edited !== this.draft_.state.edited) return; // the author went on to another tour
+    const { scene_id_: scene_id } = this;
+    const marker = await this.point_ahead();
+    // The author may have gone on to another tour, or to another scene.
+    if (edited !== this.draft_.state.edited || scene_id !== this.scene_id_) return;
     const title = text.tour.stop_numbered({ n: this.draft_.stops.length + 1 });
     this.draft_.add({
       title,
@@ -245,7 +255,7 @@ export class AuthorPanel {
   private async take_view(index: number): Promise<void> {
     const eye = this.tools_.navigation.eye;
     const stop = this.draft_.stops[index];
-    const marker = await this.tools_.navigation.point_ahead();
+    const marker = await this.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop); // it may have moved meanwhile
     if (at < 0) return;
     this.draft_.change(at, { eye, marker });
@@ -254,7 +264,7 @@ export class AuthorPanel {
 
   private async take_marker(index: number): Promise<void> {
     const stop = this.draft_.stops[index];
-    const marker = await this.tools_.navigation.point_ahead();
+    const marker = await this.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop);
     if (at < 0) return;
     if (marker) this.draft_.change(at, { marker });
@@ -288,7 +298,7 @@ export class AuthorPanel {
   }
 
   private async save(made_from: SidecarTag): Promise<void> {
-    const sidecar = this.sidecar();
+    const sidecar = this.save_.disabled ? undefined : this.sidecar(); // saving already
     if (sidecar === undefined || this.token_ === undefined) return;
     const { state } = this.draft_;
     const focused = document.activeElement;
