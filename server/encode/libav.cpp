@@ -1,6 +1,7 @@
 #include "server/encode/libav.h"
 
 #include <array>
+#include <charconv>
 #include <cstdarg>
 #include <cstdio>
 #include <mutex>
@@ -25,6 +26,15 @@ T* checked(T* object) {
 }
 
 constexpr std::size_t max_captured_bytes = 1000;  // a codec may log the same error per macroblock
+
+std::optional<double> number_after(std::string_view text, std::string_view name) {
+  const std::size_t at = text.find(name);
+  if (at == std::string_view::npos) return std::nullopt;
+  text.remove_prefix(at + name.size());
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() ? std::optional(number) : std::nullopt;
+}
 
 }  // namespace
 
@@ -74,9 +84,15 @@ LogCapture::LogCapture() : outer_(active_) {
 LogCapture::~LogCapture() { active_ = outer_; }
 
 void LogCapture::on_message(void* /*object*/, int level, const char* format, va_list arguments) {
-  if (active_ == nullptr || level > AV_LOG_ERROR) return;
+  if (active_ == nullptr) return;
+  const bool of_picture = level == AV_LOG_DEBUG && std::string_view(format).starts_with("frame=");
+  if (level > AV_LOG_ERROR && !of_picture) return;
   std::array<char, 512> line{};
   std::vsnprintf(line.data(), line.size(), format, arguments);
+  if (of_picture) {
+    active_->quantiser_ = number_after(line.data(), " QP=");
+    return;
+  }
   std::string_view text(line.data());
   while (!text.empty() && (text.back() == '\n' || text.back() == '.')) text.remove_suffix(1);
   std::string& all = active_->text_;

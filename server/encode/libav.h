@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 extern "C" {
@@ -61,6 +62,9 @@ class LogCapture {
 
   /// The logged errors, or else the meaning of `error_code`.
   [[nodiscard]] std::string explain(int error_code) const;
+  /// The mean quantiser of the picture that libx264 encoded last. Only its log tells it: packets
+  /// have the planned one. Nothing from other encoders.
+  [[nodiscard]] std::optional<double> quantiser() const { return quantiser_; }
 
  private:
   static void on_message(void* object, int level, const char* format, va_list arguments);
@@ -68,6 +72,7 @@ class LogCapture {
   static thread_local LogCapture* active_;
   LogCapture* outer_;
   std::string text_;
+  std::optional<double> quantiser_;
 };
 
 }  // namespace catgs::libav

@@ -27,10 +27,10 @@ struct EncoderEffort {
 /// superfast, veryfast, faster, fast to medium:
 /// - processor time: 5.1 / 9.3 / 16.4 / 25.2 / 40.1 / 47.1 ms;
 /// - quality: 36.7 / 42.7 / 42.4 / 43.0 / 43.0 / 43.2 dB.
-/// Measured on recorded head motion (1920x1080, 60 fps, 14 Mbit/s), with ultrafast,
-/// ultrafast-subpel and superfast:
-/// - processor time: 14 / 20 / 26 ms;
-/// - quality: 39.9 / 43.8 / 44.2 dB, and 47.6 / 50.6 / 50.4 dB on calmer motion.
+/// Measured on heads, a drone and a walk in three scenes (1920x1080, 60 fps, 8 Mbit/s), with
+/// ultrafast, ultrafast-subpel and superfast:
+/// - processor time: 6.0 / 8.1 / 9.9 ms;
+/// - quality: 41.0 / 46.1 / 47.0 dB.
 struct EffortPreset {
   std::string_view name;
   double cost;

@@ -158,18 +158,14 @@ void FrameLoop::limit(FrameOrder& order, TimePoint now) {
       std::max(min_bitrate_kbps, std::min(order.bitrate_kbps, static_cast<int>(enough_kbps)));
 }
 
-bool FrameLoop::made(const FrameResult& result, glm::ivec2 moving_size_px, TimePoint now) {
+bool FrameLoop::made(const FrameResult& result, TimePoint now) {
   failures_ = 0;
   const FrameTicket& ticket = result.frame.ticket;
   if (ticket.frame_id <= obsolete_frames_) return false;
   cost_.add(ticket);
   if (!ticket.refined) settled_ = result.stats.settled;
   if (!ticket.still) detail_.update(cost_.render(), interval(), now);
-  // The VBV follows the bitrate one picture late. The first still in the stream of motion therefore
-  // had no more room than a picture in motion.
-  const bool had_room =
-      ticket.size_px != moving_size_px || refinements_left_ + 1 < policy_.refine_frames;
-  if (result.sharp && had_room) refinements_left_ = 0;
+  if (result.sharp) refinements_left_ = 0;
   const std::size_t bytes = result.frame.bitstream.size();
   if (ticket.still) {
     const std::chrono::duration<double> passing = flow_.time_on_link(bytes, now);

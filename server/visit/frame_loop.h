@@ -55,7 +55,7 @@ class FrameLoop {
   /// Fills in the pose and the size limit of a frame. `order` already holds the encoder settings.
   void start(FrameOrder& order, TimePoint now);
   /// A frame was made and is about to be sent. False: discard it.
-  bool made(const FrameResult& result, glm::ivec2 moving_size_px, TimePoint now);
+  bool made(const FrameResult& result, TimePoint now);
   /// The picture that is shown would look better now.
   void outdate() { settled_ = false; }
   /// A frame failed, so its picture is not on the screen.

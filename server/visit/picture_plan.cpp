@@ -68,6 +68,7 @@ EncoderSettings PicturePlan::still() const {
   if (still_size_px() == moving_.size_px) return still;
   EncoderEffort effort = effort_;
   effort.preset = std::max(effort.preset, least_still_preset);
+  effort.threads = 1;  // one slice has the better picture, and a still has the time
   apply(effort, still);
   still.size_px = still_size_px();
   still.fps = std::min(still.fps, still_fps);  // sizes the VBV that its first picture finds full

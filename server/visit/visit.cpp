@@ -215,7 +215,7 @@ void Visit::on_frame(FrameResult result, TimePoint now) {
     if (result.fault == Fault::device_failed) stream_.open();  // perhaps on another device
     return;
   }
-  if (!frames_.made(result, stream_.plan().moving().size_px, now)) return;
+  if (!frames_.made(result, now)) return;
   last_said_ = now;
   if (stream_.scene()->in_pages && !result.frame.ticket.refined)
     statistics_.pages_drawn(result.stats, frames_.detail_px());

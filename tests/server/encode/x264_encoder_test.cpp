@@ -114,7 +114,7 @@ TEST(X264Encoder, EveryFrameIsOneAccessUnitAndIdrsComeOnlyOnDemand) {
         }
       }
       EXPECT_EQ(pictures, 1) << "frame " << time;
-      EXPECT_EQ(slices, threads) << "frame " << time;
+      EXPECT_EQ(slices, std::min(threads, 2)) << "frame " << time;
       const auto types = types_of(out);
       EXPECT_EQ(std::count(types.begin(), types.end(), h264::NalType::sps), out.idr ? 1 : 0);
       EXPECT_EQ(std::count(types.begin(), types.end(), h264::NalType::pps), out.idr ? 1 : 0);
@@ -158,7 +158,7 @@ double largest_share(Encoder& encoder, int first_time, int frames, double budget
   return largest;
 }
 
-// The one-frame VBV: no P-frame may take a link of that bitrate longer than its frame interval.
+// The VBV of one frame: no P-frame may take a link of that bitrate longer than its frame interval.
 TEST(X264Encoder, NoFrameOutgrowsItsShareOfTheBitrate) {
   for (const int bitrate_kbps : {2000, 8000}) {
     const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, bitrate_kbps, 60));

@@ -58,7 +58,7 @@ class EffortControlTest : public testing::Test {
 };
 
 TEST_F(EffortControlTest, LargePicturesAreCutInTwoWhereSessionsAreFewerThanProcessors) {
-  EXPECT_EQ(control.initial(1, full_hd).threads, 2) << "four would starve the VBV";
+  EXPECT_EQ(control.initial(1, full_hd).threads, 2) << "no more slices";
   EXPECT_EQ(control.initial(8, full_hd).threads, 2);
   EXPECT_EQ(control.initial(9, full_hd).threads, 2) << "rounded up";
   EXPECT_EQ(control.initial(16, full_hd).threads, 1);
