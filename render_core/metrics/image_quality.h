@@ -30,6 +30,10 @@ struct ImageQuality {
 /// averaged over the channels and the positions where the whole window fits.
 ImageQuality compare_images(const Image& a, const Image& b);
 
+/// The same SSIM of BT.709 luma alone. Both pictures must have the same size
+/// (std::invalid_argument).
+double luma_ssim(const Image& a, const Image& b);
+
 /// Two consecutive pictures.
 struct Step {
   const Image& before;

@@ -40,11 +40,14 @@ class Connection {
   boost::asio::awaitable<void> read_inbox();
   boost::asio::awaitable<void> flood();
   boost::asio::awaitable<void> drop_line();
+  boost::asio::awaitable<void> refresh_display();
   boost::asio::awaitable<void> attempt(boost::asio::awaitable<void> part);
 
   void say_hello();
   void say(const v1::ClientMessage& message);
   void acknowledge(v1::Ack ack, std::int64_t presented_us);
+  /// Decoded: the next refresh shows it, unless a newer one has come.
+  void show(const v1::Ack& ack, std::int64_t decoded_us);
   void take_message(const v1::ServerMessage& message);
   void take_welcome(const v1::Welcome& welcome);
   void take_frame(const FrameMessage& frame);
@@ -58,6 +61,8 @@ class Connection {
   boost::asio::steady_timer outbox_filled_;  // cancelled when there is something to write
   std::deque<std::string> outbox_;
   DecodeStage decode_stage_;
+  std::optional<v1::Ack> undisplayed_;  // of the newest decoded frame
+  glm::vec3 focus_{0.0f};               // of the scene
   bool bye_said_ = false;
   std::shared_ptr<const Trajectory> trajectory_;
   std::int64_t hello_us_ = 0;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "render_core/base/cli_fwd.h"
 #include "render_core/motion/script.h"
 #include "tests/load/link.h"
@@ -37,6 +39,17 @@ struct Manners {
   double stall_for_s = 0.0;  // … for this long; 0: no stall
 };
 
+/// How the page's newest picture is warped to its newest camera.
+enum class WarpMode { automatic, turn, plane, off };
+
+/// What a client shows, and how, as the page does.
+struct DisplayOptions {
+  bool judged = false;  // by exact pictures, after the run
+  int hz = 60;
+  WarpMode warp = WarpMode::automatic;  // as in the page's mode: plane for orbits, else turn
+  glm::dvec2 overscan{1.0};             // sides of pictures over those of the view
+};
+
 /// Clients that are alike. Times are seconds since the run began.
 struct GroupOptions {
   std::string name = unnamed_group;
@@ -55,6 +68,7 @@ struct GroupOptions {
 
   Wishes wishes;
   Manners manners;
+  DisplayOptions display;
   LinkSettings link;
 };
 
