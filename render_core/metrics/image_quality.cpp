@@ -145,6 +145,7 @@ ImageQuality compare_images(const Image& a, const Image& b) {
     quality.ssim +=
         mean_ssim({a.rgb.data() + c, 3, a.size_px}, {b.rgb.data() + c, 3, b.size_px}) / 3.0;
   }
+  quality.ssim_luma = luma_ssim(a, b);
   return quality;
 }
 

@@ -15,6 +15,7 @@ struct ImageQuality {
   double mean_squared_error = 0.0;  // over pixels and channels
   double max_error = 0.0;           // largest absolute difference of a channel
   double ssim = 1.0;                // NaN for pictures smaller than the window
+  double ssim_luma = 1.0;
   // Mean squared errors of the 16x16 blocks from the upper left corner (cut at the right and lower
   // edges), in increasing order. One faulty tile hides in a mean of 52 dB, not here.
   std::vector<double> block_errors;

@@ -155,6 +155,7 @@ void DecodeStage::keep_frame(Item& item, bool first) {
   log.near_z = scene_.near_z();
   log.scene_id = scene_.scene_id();
   log.frames.push_back({.eye = {from_wire(item.header.render_pose()), item.header.fov_y_rad()},
+                        .size_px = {item.header.width_px(), item.header.height_px()},
                         .pose_us = item.header.pose_client_time_us(),
                         .codec = *codec_ == v1::CODEC_MJPEG ? Codec::mjpeg : Codec::h264,
                         .first = first,

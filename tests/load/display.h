@@ -16,7 +16,8 @@ namespace catgs::load {
 /// Everything that a client showed, so that its pictures can be made again after the run.
 struct DisplayLog {
   struct Frame {
-    Eye eye;                   // that it was drawn for
+    Eye eye;  // that it was drawn for
+    glm::ivec2 size_px{0};
     std::int64_t pose_us = 0;  // when the pose behind it was sampled
     Codec codec = Codec::h264;
     bool first = false;  // of its decoder

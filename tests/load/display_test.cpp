@@ -1,12 +1,15 @@
 // What a client showed, made again after the run and judged by exact pictures.
 #include "tests/load/display.h"
 
+#include <numbers>
+
 #include <glm/gtc/quaternion.hpp>
 #include <nlohmann/json.hpp>
 
 #include "render_core/synth/synth.h"
 #include "tests/load/display_check.h"
 #include "tests/load/metrics.h"
+#include "tests/load/overscan.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
@@ -54,6 +57,44 @@ TEST(Warp, SamplesPixelCentresAndRepeatsTheBorder) {
   for (int x = 0; x < 4; ++x) EXPECT_FLOAT_EQ(wide.rgb[3 * x], expected[x]) << x;
 }
 
+struct Turn {
+  double yaw_rad, pitch_rad, period_s;
+
+  [[nodiscard]] Pose at(double s) const {
+    const double phase = 2.0 * std::numbers::pi * std::max(0.0, s) / period_s;
+    const glm::dquat yaw = glm::angleAxis(yaw_rad * std::sin(phase), glm::dvec3(0, -1, 0));
+    const glm::dquat pitch = glm::angleAxis(pitch_rad * std::sin(2.0 * phase), glm::dvec3(1, 0, 0));
+    return {glm::vec3(0.0f), glm::quat(yaw * pitch)};
+  }
+};
+
+// tests/web_client/display.test.ts holds the page to the same choices.
+TEST(Overscan, IsThatOfTheSharedTurns) {
+  std::ifstream file(CATGS_WARP_GOLDEN);
+  const json golden = json::parse(file);
+  Overscan overscan;
+  json changes = json::array();
+  double begin_s = 0.0;
+  int refresh = 0;
+  for (const json& part : golden.at("turns")) {
+    const Turn turn{part.at("yaw_rad"), part.at("pitch_rad"), part.at("period_s")};
+    const int seconds = part.at("seconds");
+    for (int i = 1; i <= 60 * seconds; ++i, ++refresh) {
+      const double s = i / 60.0;
+      const auto now_us = static_cast<std::int64_t>(std::llround((begin_s + s) * 1e6));
+      overscan.moved(now_us, turn.at(s));
+      const glm::dvec2 sides = overscan.sides();
+      const Eye picture{turn.at(s - part.at("lag_s").get<double>()), widened_fov(1.0f, sides.y)};
+      if (overscan.drawn(picture, 640.0 * sides.x / (360.0 * sides.y), {turn.at(s), 1.0f},
+                         16.0 / 9.0, std::numeric_limits<double>::infinity(), now_us))
+        changes.push_back(
+            {{"refresh", refresh}, {"x", overscan.sides().x}, {"y", overscan.sides().y}});
+    }
+    begin_s += seconds;
+  }
+  EXPECT_EQ(changes, golden.at("overscans")) << changes;
+}
+
 /// A log of refreshes 10 ms apart: the frame of each one; negative at rest.
 DisplayLog shown(const std::vector<int>& frames) {
   DisplayLog log;
@@ -85,7 +126,7 @@ TEST(Display, FreezesAreLongIntervalsWhileTheCameraMoves) {
       << "150 ms is under 10 + 150";
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(4, 40), {5}}))), ElementsAre(400.0));
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(4, 40)}))), ElementsAre(390.0))
-      << "one that goes on at the end";
+      << "one without an end";
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(-4, 40), {4, 5}}))), IsEmpty())
       << "a picture at rest stays";
 }
@@ -122,6 +163,7 @@ class SmallCity : public ::testing::Test {
     EncodedFrame encoded;
     ASSERT_TRUE(encoder->encode(frame, true, encoded).ok);
     frame_ = {.eye = {start_.world_from_camera, fov_y_rad},
+              .size_px = picture_px,
               .pose_us = 0,
               .codec = Codec::h264,
               .first = true,

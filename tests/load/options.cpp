@@ -51,7 +51,8 @@ CLI::Option* add_display_options(CLI::App& app, DisplayOptions& display) {
   app.add_option_function<std::string>(
          "--overscan",
          [&display](const std::string& text) { display.overscan = parse_overscan(text); },
-         "Sides of pictures over those of the view, such as 1.26x1.12 (default: 1x1)")
+         "Sides of pictures over those of the view, such as 1.26x1.12 (default: by the motion, as "
+         "the page)")
       ->needs(glass);
   return glass;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,7 +48,8 @@ struct DisplayOptions {
   bool judged = false;  // by exact pictures, after the run
   int hz = 60;
   WarpMode warp = WarpMode::automatic;  // as in the page's mode: plane for orbits, else turn
-  glm::dvec2 overscan{1.0};             // sides of pictures over those of the view
+  // Sides of pictures over those of the view; nothing: chosen by the motion, as the page does.
+  std::optional<glm::dvec2> overscan{};
 };
 
 /// Clients that are alike. Times are seconds since the run began.
