@@ -197,7 +197,10 @@ void add_displays(const RunReport& report, const HoldBounds& bounds, Json& parts
   for (const std::string& column : displays.columns) table["columns"].push_back(column);
   for (const PaperTable::Row& row : displays.rows) {
     Json& cells = table["rows"].emplace_back(Json::array({row.name}));
-    for (const Number& number : row.numbers) cells.push_back(number.value);
+    for (const Number& number : row.numbers) {
+      const bool never = std::isinf(number.value);  // JSON has no infinity
+      cells.push_back(never ? Json("∞") : Json(number.value));
+    }
   }
   Json plots = Json::array();
   const auto over_time = [&](const Json& plot, auto value) {

@@ -138,7 +138,7 @@ PaperTable display_table(const RunReport& report, const HoldBounds& bounds) {
                                 {"PSNR dB mean", "display_psnr_mean_db", 1},
                                 {"p5", "display_psnr_p5_db", 1},
                                 {"min", "display_psnr_min_db", 1},
-                                {"beside the picture %", "display_uncovered_percent", 2},
+                                {"uncovered %", "display_uncovered_percent", 2},
                                 {"pose age ms p50", "display_age_p50_ms", 0},
                                 {"p95", "display_age_p95_ms", 0},
                                 {"freezes", "display_freezes", 0},
