@@ -213,16 +213,14 @@ void add_displays(const RunReport& report, const HoldBounds& bounds, Json& parts
         },
         plots);
   };
-  over_time({{"title", "SSIM over the seconds"}, {"unit", "SSIM"}, {"floor", 0.5}},
+  over_time({{"title", "SSIM over time"}, {"unit", "SSIM"}, {"floor", 0.5}},
             [](const JudgedRefresh& refresh) { return refresh.ssim; });
-  over_time({{"title", "PSNR over the seconds"}, {"unit", "dB"}, {"floor", 15.0}},
+  over_time({{"title", "PSNR over time"}, {"unit", "dB"}, {"floor", 15.0}},
             [](const JudgedRefresh& refresh) { return refresh.psnr_db; });
-  over_time({{"title", "age of the pose over the seconds, moving"}, {"unit", "ms"}},
-            [](const JudgedRefresh& refresh) {
-              return refresh.rest > 0 ? std::nan("") : refresh.age_ms;
-            });
+  over_time({{"title", "pose age over time"}, {"unit", "ms"}},
+            [](const JudgedRefresh& refresh) { return refresh.age_ms; });
   add_display_plots(
-      report, {{"title", "refreshes up to an SSIM"}, {"unit", "%"}},
+      report, {{"title", "SSIM of refreshes"}, {"unit", "% up to x"}},
       [](const SessionReport& session, Json& curve) {
         std::map<double, std::size_t> count;
         std::size_t all = 0;
@@ -236,7 +234,7 @@ void add_displays(const RunReport& report, const HoldBounds& bounds, Json& parts
         }
       },
       plots);
-  parts.push_back({{"heading", "What visitors saw: " + displays.notes.front()},
+  parts.push_back({{"heading", "What visitors saw, over seconds. " + displays.notes.front()},
                    {"table", std::move(table)},
                    {"plots", std::move(plots)}});
 }

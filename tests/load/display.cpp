@@ -1,6 +1,7 @@
 #include "tests/load/display.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace catgs::load {
@@ -9,12 +10,10 @@ std::vector<double> pose_ages_ms(const DisplayLog& log) {
   std::vector<double> ages_ms;
   std::int64_t rested_us = 0;  // the camera was where it was until then
   for (const DisplayLog::Refresh& refresh : log.refreshes) {
-    if (refresh.rest > 0) {
-      rested_us = refresh.time_us;
-    } else {
-      const std::int64_t left_us = std::max(log.frames[refresh.frame].pose_us, rested_us);
-      ages_ms.push_back(1e-3 * static_cast<double>(refresh.time_us - left_us));
-    }
+    if (refresh.rest > 0) rested_us = refresh.time_us;
+    const std::int64_t left_us = std::max(log.frames[refresh.frame].pose_us, rested_us);
+    const double age_ms = 1e-3 * static_cast<double>(refresh.time_us - left_us);
+    ages_ms.push_back(refresh.rest > 0 ? std::nan("") : age_ms);
   }
   return ages_ms;
 }

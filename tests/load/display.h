@@ -45,8 +45,8 @@ struct DisplayLog {
 /// Frames of a longer run would not fit into memory.
 inline constexpr std::size_t max_display_log_bytes = std::size_t{1} << 30;
 
-/// Age of the pose behind the frame on show, at each refresh while the camera moves. A rest does
-/// not count: the camera was still there.
+/// Age of the pose behind the frame on show at each refresh; NaN at rest. A rest does not count
+/// afterwards either: the camera was still there.
 std::vector<double> pose_ages_ms(const DisplayLog& log);
 
 /// Freezes while the camera moves, as W3C's webrtc-stats defines them: no new frame for the longer
@@ -59,7 +59,7 @@ struct JudgedRefresh {
   double ssim = 0.0;  // of luma
   double psnr_db = 0.0;
   double uncovered = 0.0;     // share of the view
-  double age_ms = 0.0;        // of the pose behind the frame
+  double age_ms = 0.0;        // of the pose behind the frame; NaN at rest
   bool sampled = false;       // one of every k; false: judged only for the time to a sharp picture
   int rest = 0;               // counted from 1
   std::int64_t after_us = 0;  // at rest: since the last pose that moved

@@ -160,9 +160,8 @@ class Judge {
 
   [[nodiscard]] JudgedRefresh judged(std::size_t i, bool sampled) const {
     const DisplayLog::Refresh& refresh = log_.refreshes[i];
-    const std::int64_t age_us = refresh.time_us - log_.frames[refresh.frame].pose_us;
     return {.at_s = 1e-6 * static_cast<double>(refresh.time_us - log_.refreshes[0].time_us),
-            .age_ms = 1e-3 * static_cast<double>(age_us),
+            .age_ms = ages_ms_[i],
             .sampled = sampled,
             .rest = refresh.rest,
             .after_us = refresh.after_us};
@@ -195,6 +194,7 @@ class Judge {
   std::vector<JudgedRefresh>& judged_;
   WorstPairs& worst_;
   Playback playback_{log_};
+  const std::vector<double> ages_ms_ = pose_ages_ms(log_);
   std::vector<Pair> pairs_;    // not compared yet
   std::vector<bool> repeats_;  // of judged_: shows what the one before did
   std::size_t last_ = 0;       // the refresh of the newest pair

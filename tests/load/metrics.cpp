@@ -149,7 +149,8 @@ void add_displays(const SessionReports& sessions, Metrics& metrics) {
     }
     for (int rest = 1; rest <= session->rests; ++rest)
       sharp_ms.push_back(shown_sharp_after_ms(*session, rest));
-    std::ranges::copy(pose_ages_ms(*session->display), std::back_inserter(ages_ms));
+    std::ranges::copy_if(pose_ages_ms(*session->display), std::back_inserter(ages_ms),
+                         [](double age_ms) { return !std::isnan(age_ms); });
     std::ranges::copy(freezes_ms(*session->display), std::back_inserter(freezes));
   }
   for (std::vector<double>* values : {&ssim, &psnr_db, &ages_ms, &freezes, &sharp_ms})

@@ -189,6 +189,32 @@ TEST(PictureCheck, ColoursOfBothRanges) {
   expect_pixel(grey(76, 85, 255, true), 1, 0, 0);  // JFIF red
 }
 
+TEST(ChartDocument, DisplaysOfOneMotionShareAPlot) {
+  Outcome outcome;
+  for (const char* name : {"city/head/clean", "city/head/step"}) {
+    GroupReport& group = outcome.report.groups.emplace_back();
+    group.name = name;
+    group.series = std::make_unique<TimeSeries>(0);
+    group.sessions.push_back(std::make_unique<SessionReport>(60.0, group.series.get()));
+    SessionReport& session = *group.sessions[0];
+    session.rests = 1;
+    session.display.emplace();
+    session.judged = {{.at_s = 0.5, .ssim = 0.9, .psnr_db = 30.0, .sampled = true},
+                      {.at_s = 1.0, .ssim = 0.8, .psnr_db = 28.0, .rest = 1}};
+  }
+  const auto displays = chart_document({}, outcome).at("parts").at(0);
+  const auto& row = displays.at("table").at("rows").at(1);
+  EXPECT_EQ(row.at(0), "city/head/step");
+  EXPECT_EQ(row.at(1), 0.9);
+  EXPECT_EQ(row.at(12), "∞") << "it never became sharp";
+  const auto& plots = displays.at("plots");
+  ASSERT_EQ(plots.size(), 4u);
+  EXPECT_EQ(plots.at(0).at("title"), "city/head: SSIM over time");
+  const auto& curve = plots.at(0).at("curves").at(1);
+  EXPECT_EQ(curve.at("name"), "step");
+  EXPECT_EQ(curve.at("y"), nlohmann::json::array({0.9}));
+}
+
 TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {
   Scenario scenario;
   scenario.title = "</script>";
