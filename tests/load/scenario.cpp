@@ -193,8 +193,11 @@ Scenario read_scenario(const std::filesystem::path& path,
     for (const toml::table* signal : tables_of(name, *server, "signals"))
       scenario.signals.push_back(read_signal(name, *signal));
   }
-  const auto matrices = tables_of(name, table, "matrix");
-  for (const toml::table* clients : tables_of(name, table, "clients")) {
+  const auto matrices = tables_of(name, table, "matrix"),
+             groups = tables_of(name, table, "clients");
+  if (!matrices.empty() && groups.size() > 1)
+    throw mistake(name, *groups[1], "a matrix has one [[clients]], for all of its rows");
+  for (const toml::table* clients : groups) {
     if (matrices.empty())
       read_group(path, *clients, scenario.load.groups.emplace_back());
     else

@@ -127,6 +127,7 @@ sizes = ["160x90"]
   EXPECT_EQ(read_scenario(folder_ / "s.toml", other).load.groups.size(), 4u);
 
   expect_refused("[matrix]\n[[clients]]\n", "a matrix needs check-scene");
+  expect_refused("[matrix]\n[[clients]]\n[[clients]]\n", "line 3: a matrix has one [[clients]]");
   expect_refused("check-scene = \"synth:city:1\"\n[[matrix.trace]]\nname = \"a\"\n[[clients]]\n",
                  "a matrix needs a [[matrix.link]]");
   expect_refused("check-scene = \"synth:city:1\"\n[[matrix.trace]]\n[[clients]]\n",
