@@ -80,7 +80,7 @@ while read -r package; do
 done < <("$SOURCE_DIR/deploy/runtime_packages.sh" "$build"/bin/*)
 if [[ -x $root/bin/catgs-load ]]; then
   mkdir -p "$root/share/catgs/load"
-  cp -r -- "$SOURCE_DIR"/tests/load/{README.md,alternate.py,scenarios} "$root/share/catgs/load/"
+  cp -r -- "$SOURCE_DIR"/tests/load/{README.md,GLASS.md,alternate.py,scenarios} "$root/share/catgs/load/"
 fi
 if [[ -f $build/web_client/dist/index.html ]]; then
   mkdir -p "$root/share/catgs"  # where the server looks, seen from its program

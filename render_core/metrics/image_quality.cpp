@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "render_core/math/colour-inl.h"
 #include "render_core/metrics/summary.h"
 
 namespace catgs {
@@ -49,11 +50,23 @@ double ssim_of(const Moments& m) {
          ((m.a * m.a + m.b * m.b + c1) * (variance_a + variance_b + c2));
 }
 
-/// Sum of SSIM over all window positions of one channel. The window is separable: rows are
-/// filtered once and kept for the eleven windows that meet them.
-double ssim_sum(const Image& a, const Image& b, int channel) {
+/// One channel of a picture.
+struct Channel {
+  const float* first;
+  int step;  // from a pixel to the next
+  glm::ivec2 size_px;
+
+  [[nodiscard]] double at(int x, int y) const {
+    return first[(static_cast<std::ptrdiff_t>(y) * size_px.x + x) * step];
+  }
+};
+
+/// Mean of SSIM over all window positions. The window is separable: rows are filtered once and kept
+/// for the eleven windows that meet them.
+double mean_ssim(const Channel& a, const Channel& b) {
   static const std::array<double, window_px> weights = gaussian_window();
   const int columns = a.size_px.x - window_px + 1;
+  if (columns < 1 || a.size_px.y < window_px) return std::numeric_limits<double>::quiet_NaN();
   std::array<std::vector<Moments>, window_px> rows;  // row y lies in rows[y % window_px]
   double sum = 0.0;
   for (int y = 0; y < a.size_px.y; ++y) {
@@ -61,8 +74,8 @@ double ssim_sum(const Image& a, const Image& b, int channel) {
     filtered.assign(static_cast<std::size_t>(columns), {});
     for (int x = 0; x < columns; ++x) {
       for (int i = 0; i < window_px; ++i) {
-        const double va = a.row(y)[(x + i) * 3 + channel];
-        const double vb = b.row(y)[(x + i) * 3 + channel];
+        const double va = a.at(x + i, y);
+        const double vb = b.at(x + i, y);
         filtered[x].add(weights[i], {va, vb, va * va, vb * vb, va * vb});
       }
     }
@@ -75,15 +88,23 @@ double ssim_sum(const Image& a, const Image& b, int channel) {
       sum += ssim_of(window);
     }
   }
-  return sum;
+  return sum / (static_cast<double>(columns) * (a.size_px.y - window_px + 1));
 }
 
-double mean_ssim(const Image& a, const Image& b) {
-  const glm::ivec2 positions = a.size_px - (window_px - 1);
-  if (positions.x < 1 || positions.y < 1) return std::numeric_limits<double>::quiet_NaN();
-  double sum = 0.0;
-  for (int channel = 0; channel < 3; ++channel) sum += ssim_sum(a, b, channel);
-  return sum / (3.0 * positions.x * positions.y);
+/// BT.709 luma of each pixel.
+std::vector<float> luma_of(const Image& image) {
+  using math::luma_blue, math::luma_green, math::luma_red;
+  std::vector<float> luma(image.pixels());
+  for (std::size_t i = 0; i < luma.size(); ++i) {
+    luma[i] = static_cast<float>(luma_red * image.rgb[3 * i] + luma_green * image.rgb[3 * i + 1] +
+                                 luma_blue * image.rgb[3 * i + 2]);
+  }
+  return luma;
+}
+
+void check_sizes(const Image& a, const Image& b) {
+  if (a.size_px != b.size_px || a.rgb.empty())
+    throw std::invalid_argument("compare_images: needs two pictures of one size");
 }
 
 }  // namespace
@@ -98,9 +119,7 @@ double ImageQuality::block_0_1_percent_psnr() const {
 }
 
 ImageQuality compare_images(const Image& a, const Image& b) {
-  if (a.size_px != b.size_px || a.rgb.empty()) {
-    throw std::invalid_argument("compare_images: needs two pictures of one size");
-  }
+  check_sizes(a, b);
   ImageQuality quality;
   double total = 0.0;
   for (int top = 0; top < a.size_px.y; top += block_px) {
@@ -121,8 +140,19 @@ ImageQuality compare_images(const Image& a, const Image& b) {
   }
   std::ranges::sort(quality.block_errors);
   quality.mean_squared_error = total / static_cast<double>(a.rgb.size());
-  quality.ssim = mean_ssim(a, b);
+  quality.ssim = 0.0;
+  for (int c = 0; c < 3; ++c) {
+    quality.ssim +=
+        mean_ssim({a.rgb.data() + c, 3, a.size_px}, {b.rgb.data() + c, 3, b.size_px}) / 3.0;
+  }
+  quality.ssim_luma = luma_ssim(a, b);
   return quality;
+}
+
+double luma_ssim(const Image& a, const Image& b) {
+  check_sizes(a, b);
+  const std::vector<float> luma_a = luma_of(a), luma_b = luma_of(b);
+  return mean_ssim({luma_a.data(), 1, a.size_px}, {luma_b.data(), 1, b.size_px});
 }
 
 double pop_excess(const Step& shown, const Step& truth) {

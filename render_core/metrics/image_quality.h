@@ -15,6 +15,7 @@ struct ImageQuality {
   double mean_squared_error = 0.0;  // over pixels and channels
   double max_error = 0.0;           // largest absolute difference of a channel
   double ssim = 1.0;                // NaN for pictures smaller than the window
+  double ssim_luma = 1.0;
   // Mean squared errors of the 16x16 blocks from the upper left corner (cut at the right and lower
   // edges), in increasing order. One faulty tile hides in a mean of 52 dB, not here.
   std::vector<double> block_errors;
@@ -29,6 +30,10 @@ struct ImageQuality {
 /// al. (2004): 11x11 Gaussian window of sigma 1.5 px, K1 = 0.01, K2 = 0.03, on each of R, G and B,
 /// averaged over the channels and the positions where the whole window fits.
 ImageQuality compare_images(const Image& a, const Image& b);
+
+/// The same SSIM of BT.709 luma alone. Both pictures must have the same size
+/// (std::invalid_argument).
+double luma_ssim(const Image& a, const Image& b);
 
 /// Two consecutive pictures.
 struct Step {

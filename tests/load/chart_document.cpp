@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -168,6 +169,76 @@ Json metric_table(const Metrics& metrics) {
   return {{"columns", {"metric", "value"}}, {"rows", std::move(rows)}};
 }
 
+/// Points of each group's judged refreshes. Groups of a matrix whose names differ in the last part
+/// share a plot.
+template <typename Add>
+void add_display_plots(const RunReport& report, const Json& plot, Add add, Json& plots) {
+  std::map<std::string, Json> families;
+  for (const GroupReport& group : report.groups) {
+    const std::size_t slash = group.name.rfind('/');
+    const bool alone = slash == std::string::npos;
+    Json of_group = curve(alone ? group.name : group.name.substr(slash + 1));
+    for (const auto& session : group.sessions) add(*session, of_group);
+    if (of_group["x"].empty()) continue;
+    families[alone ? "" : group.name.substr(0, slash)].push_back(std::move(of_group));
+  }
+  for (auto& [family, curves] : families) {
+    Json& one = plots.emplace_back(plot);
+    if (!family.empty())
+      one["title"] = fmt::format("{}: {}", family, plot["title"].get<std::string>());
+    one["curves"] = std::move(curves);
+  }
+}
+
+void add_displays(const RunReport& report, const HoldBounds& bounds, Json& parts) {
+  const PaperTable displays = display_table(report, bounds);
+  if (displays.rows.empty()) return;
+  Json table = {{"columns", Json::array({"clients"})}, {"rows", Json::array()}};
+  for (const std::string& column : displays.columns) table["columns"].push_back(column);
+  for (const PaperTable::Row& row : displays.rows) {
+    Json& cells = table["rows"].emplace_back(Json::array({row.name}));
+    for (const Number& number : row.numbers) {
+      const bool never = std::isinf(number.value);  // JSON has no infinity
+      cells.push_back(never ? Json("∞") : Json(number.value));
+    }
+  }
+  Json plots = Json::array();
+  const auto over_time = [&](const Json& plot, auto value) {
+    add_display_plots(
+        report, plot,
+        [&](const SessionReport& session, Json& curve) {
+          for (const JudgedRefresh& refresh : session.judged) {
+            if (refresh.sampled) add_point(curve, refresh.at_s, value(refresh));
+          }
+        },
+        plots);
+  };
+  over_time({{"title", "SSIM over time"}, {"unit", "SSIM"}, {"floor", 0.5}},
+            [](const JudgedRefresh& refresh) { return refresh.ssim; });
+  over_time({{"title", "PSNR over time"}, {"unit", "dB"}, {"floor", 15.0}},
+            [](const JudgedRefresh& refresh) { return refresh.psnr_db; });
+  over_time({{"title", "pose age over time"}, {"unit", "ms"}},
+            [](const JudgedRefresh& refresh) { return refresh.age_ms; });
+  add_display_plots(
+      report, {{"title", "SSIM of refreshes"}, {"unit", "% up to x"}},
+      [](const SessionReport& session, Json& curve) {
+        std::map<double, std::size_t> count;
+        std::size_t all = 0;
+        for (const JudgedRefresh& refresh : session.judged) {
+          if (refresh.sampled) ++count[refresh.ssim], ++all;
+        }
+        std::size_t sum = 0;
+        for (const auto& [ssim, refreshes] : count) {
+          sum += refreshes;
+          add_point(curve, ssim, 100.0 * static_cast<double>(sum) / static_cast<double>(all));
+        }
+      },
+      plots);
+  parts.push_back({{"heading", "What visitors saw, over seconds. " + displays.notes.front()},
+                   {"table", std::move(table)},
+                   {"plots", std::move(plots)}});
+}
+
 }  // namespace
 
 Json chart_document(const Scenario& scenario, const Outcome& outcome) {
@@ -185,6 +256,7 @@ Json chart_document(const Scenario& scenario, const Outcome& outcome) {
   Json parts = Json::array();
   if (!outcome.requirements.empty())
     parts.push_back({{"heading", "Requirements"}, {"table", requirement_table(outcome)}});
+  add_displays(report, scenario.bounds, parts);
   parts.push_back({{"heading", "Clients"}, {"table", group_table(report, scenario.bounds)}});
   parts.push_back({{"heading", "Over time, in seconds"}, {"plots", std::move(plots)}});
   parts.push_back({{"heading", "Distributions"},

@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include <boost/asio/experimental/awaitable_operators.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/websocket/stream_base.hpp>
+#include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
 #include "render_core/base/error.h"
 #include "tests/load/pose_replay.h"
 #include "tests/load/waiting.h"
+#include "tests/load/warp.h"
 
 namespace catgs::load {
 namespace {
@@ -33,6 +37,16 @@ SceneHints hints_of(const v1::SceneFacts& scene) {
   return hints;
 }
 
+/// As frame_sizes.ts makes it.
+std::uint32_t frame_side(double px) {
+  return static_cast<std::uint32_t>(std::clamp(2.0 * std::round(px / 2.0), 16.0, 8192.0));
+}
+
+/// The first refresh after `time_us`.
+std::int64_t refresh_after(std::int64_t time_us, int hz) {
+  return ((time_us * hz / 1'000'000 + 1) * 1'000'000 + hz - 1) / hz;
+}
+
 }  // namespace
 
 Connection::Connection(const SessionSettings& settings, SessionContext context, SessionState& state,
@@ -45,7 +59,7 @@ Connection::Connection(const SessionSettings& settings, SessionContext context, 
       outbox_filled_(executor),
       decode_stage_(
           settings, context.decoders, report,
-          {.acknowledge = [this](const v1::Ack& ack, std::int64_t time) { acknowledge(ack, time); },
+          {.acknowledge = [this](const v1::Ack& ack, std::int64_t time) { show(ack, time); },
            .request_idr =
                [this] {
                  v1::ClientMessage message;
@@ -65,7 +79,8 @@ asio::awaitable<Connection::End> Connection::run() {
   say_hello();
   // The first part to end ends the others: the outbox after Bye, any part when the line is dead.
   co_await (attempt(send_poses()) || attempt(write_outbox()) || attempt(read_inbox()) ||
-            attempt(decode_stage_.run()) || attempt(flood()) || attempt(drop_line()));
+            attempt(decode_stage_.run()) || attempt(flood()) || attempt(drop_line()) ||
+            attempt(refresh_display()));
   co_return end_;
 }
 
@@ -96,6 +111,27 @@ void Connection::say(const v1::ClientMessage& message) {
   outbox_filled_.cancel();
 }
 
+glm::dvec2 Connection::overscan() const {
+  return settings_.display.overscan.value_or(state_.overscan.sides());
+}
+
+v1::Settings Connection::wanted_settings() const {
+  v1::Settings settings;
+  const glm::dvec2 sides = overscan();
+  const bool smaller = settings_.moving_size_px.x > 0;
+  if (smaller || sides != glm::dvec2(1.0)) {
+    const glm::ivec2 moving_px = smaller ? settings_.moving_size_px : settings_.size_px;
+    settings.set_width_px(frame_side(moving_px.x * sides.x));
+    settings.set_height_px(frame_side(moving_px.y * sides.y));
+    settings.set_still_width_px(frame_side(settings_.size_px.x * sides.x));
+    settings.set_still_height_px(frame_side(settings_.size_px.y * sides.y));
+  }
+  settings.set_max_fps(static_cast<std::uint32_t>(settings_.wishes.fps));
+  settings.set_max_bitrate_kbps(static_cast<std::uint32_t>(settings_.wishes.max_bitrate_kbps));
+  settings.set_fixed_quality(settings_.wishes.fixed_quality);
+  return settings;
+}
+
 void Connection::say_hello() {
   v1::ClientMessage message;
   v1::Hello& hello = *message.mutable_hello();
@@ -106,17 +142,7 @@ void Connection::say_hello() {
   hello.add_decoders(v1::CODEC_H264);
   hello.add_decoders(v1::CODEC_MJPEG);
   hello.set_token(settings_.token);
-  if (settings_.moving_size_px.x > 0) {
-    v1::Settings& sizes = *hello.mutable_settings();
-    sizes.set_width_px(static_cast<std::uint32_t>(settings_.moving_size_px.x));
-    sizes.set_height_px(static_cast<std::uint32_t>(settings_.moving_size_px.y));
-    sizes.set_still_width_px(hello.viewport_width_px());
-    sizes.set_still_height_px(hello.viewport_height_px());
-  }
-  hello.mutable_settings()->set_max_fps(static_cast<std::uint32_t>(settings_.wishes.fps));
-  hello.mutable_settings()->set_max_bitrate_kbps(
-      static_cast<std::uint32_t>(settings_.wishes.max_bitrate_kbps));
-  hello.mutable_settings()->set_fixed_quality(settings_.wishes.fixed_quality);
+  *hello.mutable_settings() = wanted_settings();
   if (!state_.resume_token.empty()) {
     hello.mutable_resume()->set_token(state_.resume_token);
     if (state_.last_pose) *hello.mutable_resume()->mutable_pose() = *state_.last_pose;
@@ -131,6 +157,7 @@ asio::awaitable<void> Connection::send_poses() {
   replay = PoseReplay(trajectory_, static_cast<std::int64_t>(
                                        settings_.offset * static_cast<double>(replay.span_us())));
   begin_us_ = now_us();
+  if (report_.display) begin_us_ = refresh_after(begin_us_, settings_.display.hz);
   std::int64_t moving_since_us = begin_us_;
   const std::int64_t move_us = microseconds(settings_.manners.move_for_s);
   const std::int64_t stay_us = microseconds(settings_.manners.leave_every_s);
@@ -156,7 +183,7 @@ asio::awaitable<void> Connection::send_poses() {
     sample.set_pose_id(state_.next_pose_id++);
     sample.set_client_time_us(now);
     *sample.mutable_world_from_camera() = to_wire(*newest);
-    sample.set_fov_y_rad(glm::radians(settings_.wishes.fov_y_deg));
+    sample.set_fov_y_rad(widened_fov(glm::radians(settings_.wishes.fov_y_deg), overscan().y));
     state_.last_pose = sample;
     report_.stats.pose_sent(sample.pose_id(), now);
     say(message);
@@ -275,6 +302,7 @@ void Connection::take_welcome(const v1::Welcome& welcome) {
   report_.encoder = welcome.config().encoder();
   report_.server_version = welcome.server_version();
   decode_stage_.set_scene(welcome.scene());
+  focus_ = from_wire(welcome.scene().focus());
   trajectory_ = settings_.make_trajectory(hints_of(welcome.scene()));
   report_.stats.started(now);
   welcomed_.cancel();
@@ -305,10 +333,76 @@ void Connection::take_frame(const FrameMessage& frame) {
   }
 }
 
+void Connection::show(const v1::Ack& ack, std::int64_t decoded_us) {
+  if (!report_.display || ack.dropped()) return acknowledge(ack, decoded_us);
+  if (undisplayed_) {
+    undisplayed_->set_dropped(true);
+    acknowledge(*undisplayed_, 0);
+  }
+  undisplayed_ = ack;
+  undisplayed_->set_decoded_us(decoded_us);
+}
+
+double Connection::warp_distance(const Pose& camera) const {
+  if (settings_.display.warp == WarpMode::off) return 0.0;
+  const float to_focus =
+      glm::dot(focus_ - camera.position, camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f));
+  const bool to_plane = settings_.display.warp == WarpMode::plane && to_focus > 0.0f;
+  return to_plane ? to_focus : std::numeric_limits<double>::infinity();
+}
+
+/// By the newest refresh of the log, if the camera has moved or a frame has come.
+void Connection::choose_overscan() {
+  if (settings_.display.overscan) return;
+  const DisplayLog& log = *report_.display;
+  const DisplayLog::Refresh& refresh = log.refreshes.back();
+  const std::size_t before = std::max<std::size_t>(log.refreshes.size(), 2) - 2;
+  const bool moved = seen_pose_id_ != state_.last_pose->pose_id();
+  if (!moved && log.refreshes[before].frame == refresh.frame) return;
+  if (moved) state_.overscan.moved(refresh.time_us, refresh.camera);
+  seen_pose_id_ = state_.last_pose->pose_id();
+  const Eye& picture = log.frames[refresh.frame].eye;
+  const glm::dvec2 size_px = log.frames[refresh.frame].size_px, view_px = log.view_px;
+  if (!state_.overscan.drawn(picture, size_px.x / size_px.y, {refresh.camera, log.fov_y_rad},
+                             view_px.x / view_px.y, refresh.distance, refresh.time_us))
+    return;
+  v1::ClientMessage message;
+  *message.mutable_settings() = wanted_settings();
+  say(message);
+}
+
+/// Shows the newest decoded frame at each refresh, right after the camera was sampled. One that
+/// comes a whole refresh late is left out, as a browser does.
+asio::awaitable<void> Connection::refresh_display() {
+  constexpr std::int64_t behind_camera_us = 500;
+  const int hz = settings_.display.hz;
+  if (!report_.display) co_await wait_until(Clock::time_point::max());
+  DisplayLog& log = *report_.display;
+  while (true) {
+    const std::int64_t due_us = refresh_after(now_us() - behind_camera_us, hz);
+    co_await wait_until(clock_time(due_us + behind_camera_us));
+    if (log.frames.empty() || log.full || !state_.last_pose || stalled()) continue;
+    const std::int64_t now = now_us();
+    const Pose camera = from_wire(state_.last_pose->world_from_camera());
+    DisplayLog::Refresh refresh{.time_us = now,
+                                .frame = log.frames.size() - 1,
+                                .camera = camera,
+                                .distance = warp_distance(camera),
+                                .overscan = overscan().y};
+    if (report_.rest) {
+      refresh.rest = report_.rest->number;
+      refresh.after_us = now - report_.rest->since_us;
+    }
+    log.refreshes.push_back(refresh);
+    choose_overscan();
+    if (undisplayed_) acknowledge(*std::exchange(undisplayed_, std::nullopt), now);
+  }
+}
+
 void Connection::acknowledge(v1::Ack ack, std::int64_t presented_us) {
   if (!settings_.manners.acknowledge) return;
   if (!ack.dropped()) {
-    ack.set_decoded_us(presented_us);
+    if (ack.decoded_us() == 0) ack.set_decoded_us(presented_us);
     ack.set_presented_us(presented_us);
   }
   v1::ClientMessage message;

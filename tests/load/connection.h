@@ -9,6 +9,7 @@
 
 #include "tests/load/channel.h"
 #include "tests/load/decode_stage.h"
+#include "tests/load/overscan.h"
 #include "tests/load/session.h"
 #include "tests/load/wire_client.h"
 
@@ -19,6 +20,7 @@ struct SessionState {
   std::string resume_token;
   std::optional<v1::PoseSample> last_pose;
   std::uint64_t next_pose_id = 1;
+  Overscan overscan;
 };
 
 /// One connection of a session. Its parts are coroutines on one executor: poses, outbox, inbox,
@@ -40,11 +42,18 @@ class Connection {
   boost::asio::awaitable<void> read_inbox();
   boost::asio::awaitable<void> flood();
   boost::asio::awaitable<void> drop_line();
+  boost::asio::awaitable<void> refresh_display();
+  [[nodiscard]] double warp_distance(const Pose& camera) const;
+  void choose_overscan();
   boost::asio::awaitable<void> attempt(boost::asio::awaitable<void> part);
 
   void say_hello();
+  [[nodiscard]] glm::dvec2 overscan() const;
+  [[nodiscard]] v1::Settings wanted_settings() const;
   void say(const v1::ClientMessage& message);
   void acknowledge(v1::Ack ack, std::int64_t presented_us);
+  /// Decoded: the next refresh shows it, unless a newer one has come.
+  void show(const v1::Ack& ack, std::int64_t decoded_us);
   void take_message(const v1::ServerMessage& message);
   void take_welcome(const v1::Welcome& welcome);
   void take_frame(const FrameMessage& frame);
@@ -58,6 +67,9 @@ class Connection {
   boost::asio::steady_timer outbox_filled_;  // cancelled when there is something to write
   std::deque<std::string> outbox_;
   DecodeStage decode_stage_;
+  std::optional<v1::Ack> undisplayed_;  // of the newest decoded frame
+  std::uint64_t seen_pose_id_ = 0;      // by the newest refresh
+  glm::vec3 focus_{0.0f};               // of the scene
   bool bye_said_ = false;
   std::shared_ptr<const Trajectory> trajectory_;
   std::int64_t hello_us_ = 0;

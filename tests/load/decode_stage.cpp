@@ -91,6 +91,7 @@ asio::awaitable<void> DecodeStage::run() {
 asio::awaitable<void> DecodeStage::decode(Item& item) {
   const std::int64_t begin_us = now_us();
   if (settings_.manners.decode) {
+    const bool first = !decoder_ || codec_ != item.header.codec();
     Decoded decoded = co_await decode_on_pool(item);
     const bool fits =
         decoded.picture.size_px == glm::ivec2(item.header.width_px(), item.header.height_px());
@@ -106,6 +107,7 @@ asio::awaitable<void> DecodeStage::decode(Item& item) {
       report_.stats.frame_decoded(decoded.duration_us);
       keep_still(item, decoded);
       keep_picture(item, decoded);
+      keep_frame(item, first);
     }
   }
   if (settings_.manners.decode_time_s > 0.0)
@@ -142,6 +144,22 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
                               .near_z = scene_.near_z(),
                               .scene_id = scene_.scene_id(),
                               .picture = std::move(decoded.picture)});
+}
+
+void DecodeStage::keep_frame(Item& item, bool first) {
+  if (!report_.display || report_.display->full) return;
+  DisplayLog& log = *report_.display;
+  log.full = log.bytes + item.bitstream.size() > max_display_log_bytes;
+  if (log.full) return report_.stats.error("the run is too long: no further frame is judged");
+  log.bytes += item.bitstream.size();
+  log.near_z = scene_.near_z();
+  log.scene_id = scene_.scene_id();
+  log.frames.push_back({.eye = {from_wire(item.header.render_pose()), item.header.fov_y_rad()},
+                        .size_px = {item.header.width_px(), item.header.height_px()},
+                        .pose_us = item.header.pose_client_time_us(),
+                        .codec = *codec_ == v1::CODEC_MJPEG ? Codec::mjpeg : Codec::h264,
+                        .first = first,
+                        .bitstream = std::move(item.bitstream)});
 }
 
 void DecodeStage::keep_still(const Item& item, const Decoded& decoded) {

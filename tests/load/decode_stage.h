@@ -59,6 +59,8 @@ class DecodeStage {
   /// In the middles of equal parts of the session's time.
   [[nodiscard]] bool picture_is_due() const;
   void keep_picture(const Item& item, Decoded& decoded);
+  /// For the display, and the check of it.
+  void keep_frame(Item& item, bool first);
   /// The first ones of the first rests, until one is large and late enough to be sharp.
   void keep_still(const Item& item, const Decoded& decoded);
 

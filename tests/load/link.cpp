@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
+#include "render_core/motion/portable.h"
 #include "tests/load/clock.h"
 #include "tests/load/units.h"
 
@@ -41,6 +42,16 @@ void add_step(std::string_view source, RateSchedule& schedule, RateStep step) {
   schedule.push_back(step);
 }
 
+/// The seed of "4g:7".
+std::uint64_t parse_seed(std::string_view source, std::string_view text) {
+  std::uint64_t seed = 0;
+  const std::string_view digits = text.substr(text.find(':') + 1);
+  const char* end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, seed);
+  if (error == std::errc() && stop == end) return seed;
+  throw InputError(source, "", fmt::format("\"{}\" is not a seed", digits), "like rate=4g:7");
+}
+
 double parse_burst(std::string_view source, std::string_view text) {
   double value = 0.0;
   const char* end = text.data() + text.size();
@@ -53,7 +64,10 @@ double parse_burst(std::string_view source, std::string_view text) {
 void set_value(std::string_view source, std::string_view key, std::string_view value,
                LinkSettings& link) {
   const auto duration_us = [&] { return microseconds(parse_duration_s(source, value)); };
-  if (key == "rate") {
+  if (key == "rate" && value.starts_with("4g:")) {
+    for (const RateStep& step : mobile_rates(parse_seed(source, value)))
+      add_step(source, link.down, step);
+  } else if (key == "rate") {
     add_step(source, link.down, parse_step(source, value));
   } else if (key == "up") {
     add_step(source, link.up, parse_step(source, value));
@@ -79,6 +93,27 @@ void set_value(std::string_view source, std::string_view key, std::string_view v
 }
 
 }  // namespace
+
+RateSchedule mobile_rates(std::uint64_t seed) {
+  constexpr int steps = 1200, step_us = 500'000;
+  constexpr double median_mbit = 12.0, deviation = 0.8, correlation_s = 5.0;
+  constexpr double between_handovers_s = 25.0, handover_mbit = 0.5;
+  const double kept = std::exp(-1e-6 * step_us / correlation_s);
+  const double handover_share = 1e-6 * step_us / between_handovers_s;
+  PortableRng random(seed);
+  RateSchedule rates;
+  double logarithm = deviation * random.normal();
+  int cut_steps = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double mbit = std::clamp(median_mbit * std::exp(logarithm), handover_mbit, 80.0);
+    if (cut_steps == 0 && random.uniform(0.0, 1.0) < handover_share)
+      cut_steps = 1 + static_cast<int>(random.uniform(0.0, 3.0));
+    rates.push_back({std::int64_t{i} * step_us, 1e6 * (cut_steps > 0 ? handover_mbit : mbit)});
+    cut_steps = std::max(0, cut_steps - 1);
+    logarithm = kept * logarithm + std::sqrt(1.0 - kept * kept) * deviation * random.normal();
+  }
+  return rates;
+}
 
 LinkSettings parse_link(std::string_view source, std::string_view text) {
   LinkSettings link;

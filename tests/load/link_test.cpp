@@ -49,10 +49,27 @@ TEST(Link, ParsesItsParts) {
   EXPECT_EQ(parse_link("--link", "rate=5mbit").up.at(0).bits_per_s, 5e6);
 }
 
+TEST(Link, MobileRatesVaryAroundTheirMedianAndRepeat) {
+  const RateSchedule rates = parse_link("--link", "rate=4g:7,delay=25ms").down;
+  ASSERT_EQ(rates.size(), 1200u);
+  EXPECT_EQ(rates[1].from_us, 500'000);
+  std::vector<double> mbit;
+  for (const RateStep& step : rates) mbit.push_back(1e-6 * step.bits_per_s);
+  std::ranges::sort(mbit);
+  EXPECT_EQ(mbit.front(), 0.5) << "handovers";
+  EXPECT_GT(mbit[60], 0.5) << "in less than 5 % of the time";
+  EXPECT_NEAR(mbit[600], 12.0, 5.0);
+  EXPECT_LE(mbit.back(), 80.0);
+  const auto step_us = [](std::uint64_t seed) { return mobile_rates(seed)[3].bits_per_s; };
+  EXPECT_EQ(step_us(7), rates[3].bits_per_s);
+  EXPECT_NE(step_us(8), rates[3].bits_per_s);
+}
+
 TEST(Link, RefusesWhatIsNone) {
   for (const char* bad : {"5mbit", "rate", "rate=", "rate=5", "rate=5mbit@3s", "speed=5mbit",
                           "rate=5mbit@0s,1mbit@0s", "delay=20m,jitter=-1ms", "loss=60%", "burst=0",
-                          "rate=5mbit,,", "congestion=vegas", "rate=5mbit,1mbit@2s,1mbit@1s"}) {
+                          "rate=5mbit,,", "rate=4g:", "rate=4g:x", "rate=1mbit,4g:1",
+                          "congestion=vegas", "rate=5mbit,1mbit@2s,1mbit@1s"}) {
     EXPECT_THROW(parse_link("--link", bad), InputError) << bad;
   }
   EXPECT_THAT([] { parse_link("--link", "speed=1mbit"); },

@@ -14,6 +14,7 @@
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <fmt/format.h>
+#include <glm/trigonometric.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/motion/anchor.h"
@@ -51,12 +52,16 @@ class TrajectoryMaker {
       constexpr int display_hz = 60;
       script.rate_hz =
           options_.pose_hz > 0 ? options_.pose_hz : std::max(display_hz, options_.wishes.fps);
+      if (options_.display.judged) script.rate_hz = options_.display.hz;
       return std::make_shared<const Trajectory>(make_script(script, scene));
     }
     const auto& trace = traces_[static_cast<std::size_t>(session) % traces_.size()];
-    if (options_.anchor) return std::make_shared<const Trajectory>(anchored(trace->poses, scene));
-    if (trace->origin == scene.origin) return {trace, &trace->poses};
-    return std::make_shared<const Trajectory>(trace->poses_about(scene.origin));
+    const bool same_origin = trace->origin == scene.origin;
+    if (!options_.anchor && !options_.display.judged && same_origin) return {trace, &trace->poses};
+    Trajectory poses =
+        options_.anchor ? anchored(trace->poses, scene) : trace->poses_about(scene.origin);
+    if (options_.display.judged) poses = resample(poses, options_.display.hz);
+    return std::make_shared<const Trajectory>(std::move(poses));
   }
 
  private:
@@ -64,6 +69,15 @@ class TrajectoryMaker {
   double duration_s_;
   std::vector<std::shared_ptr<const CameraPath>> traces_;
 };
+
+/// With the warp that `auto` means. A page that does not warp wants no overscan either.
+DisplayOptions display_of(const GroupOptions& group) {
+  DisplayOptions display = group.display;
+  if (display.warp == WarpMode::automatic)
+    display.warp = group.script.script == "orbit" ? WarpMode::plane : WarpMode::turn;
+  if (display.warp == WarpMode::off) display.overscan = glm::dvec2(1.0);
+  return display;
+}
 
 void check(const GroupOptions& group, double duration_s) {
   const double end_s = group.end_s > 0.0 ? group.end_s : duration_s;
@@ -168,6 +182,13 @@ class Run {
     if (!group.moving_size.empty())
       settings.moving_size_px = parse_size("--moving-size", group.moving_size);
     report.still_size_px = settings.size_px;
+    settings.display = display_of(group);
+    settings.manners.decode = group.manners.decode || group.display.judged;
+    if (group.display.judged) {
+      report.display.emplace();
+      report.display->view_px = settings.size_px;
+      report.display->fov_y_rad = glm::radians(group.wishes.fov_y_deg);
+    }
     // Multiples of the golden ratio spread any number of sessions evenly over a trace.
     const double golden = number * std::numbers::phi;
     settings.offset = golden - std::floor(golden);

@@ -6,6 +6,7 @@
 
 #include "render_core/base/error.h"
 #include "render_core/motion/trajectory.h"
+#include "tests/load/display_check.h"
 #include "tests/load/record.h"
 #include "tests/load/report.h"
 #include "tests/support/server_client.h"
@@ -288,6 +289,35 @@ TEST(Load, DecodesJustThePicturesThatAreKept) {
     EXPECT_LT(report->stats.durations.decode.count(), report->stats.counts.frames / 2);
     EXPECT_LE(report->stats.counts.idrs, 1u + 2 * 4) << "one for each, and what asking takes";
   }
+}
+
+TEST(Load, TheReportSaysWhatAVisitorSaw) {
+  const std::string scene = "synth:city:20000";
+  const RunningServer server([&](ServerConfig& config) { config.scenes = {scene}; });
+  LoadOptions options = small_load(url_of(server));
+  GroupOptions& group = options.groups[0];
+  group.sessions = 1;
+  group.script.script = "walk";
+  group.display.judged = true;
+  group.manners.move_for_s = 1.0;
+  group.manners.rest_for_s = 0.5;
+  RunReport run = run_load(options);
+  expect_clean(run);
+  check_displays({.scenes = {scene}, .every = 10}, run);
+  const Metrics metrics = collect_metrics(run, {});
+  const auto json = to_json(run, metrics, {});
+  const auto& display = json.at("groups")[0].at("per_session")[0].at("display");
+  const std::size_t judged = display.at("at_s").size();
+  EXPECT_GE(judged, 2u);
+  for (const char* field : {"ssim", "psnr_db", "uncovered", "age_ms", "rest", "sampled"})
+    EXPECT_EQ(display.at(field).size(), judged) << field;
+  for (const auto& [name, value] : metrics) {
+    EXPECT_FALSE(name.starts_with("display_") && std::isnan(value)) << name;
+  }
+  EXPECT_GT(value_of(metrics, "display_ssim_mean"), 0.7);
+  EXPECT_LE(value_of(metrics, "display_ssim_mean"), 1.0);
+  EXPECT_GE(value_of(metrics, "display_psnr_mean_db"), value_of(metrics, "display_psnr_p5_db"));
+  EXPECT_THAT(to_table(run, {}), HasSubstr("| SSIM mean |"));
 }
 
 TEST(Load, BadOptionsAreToldBeforeAnythingRuns) {

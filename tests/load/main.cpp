@@ -32,6 +32,7 @@ struct ProgramOptions {
   GroupOptions group;
   std::string file, server, server_log, url, token;
   double duration_s = -1.0;  // not given
+  int check_every = 0;       // not given
   bool insecure = false;
   std::string json, html;
   std::vector<std::string> without;
@@ -61,8 +62,14 @@ void add_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--token", options.token, "Access token (better: the variable)")
       ->envname("CATGS_TOKEN");
   app.add_flag("--insecure", options.insecure, "Accept any TLS certificate");
-  app.add_option("--check-scene", options.scenario.check_scene,
-                 "Compare decoded pictures with this scene, rendered here: a file or synth:…");
+  app.add_option("--check-scene", options.scenario.check.scenes,
+                 "Compare pictures with this scene, rendered here: a file or synth:…; repeatable");
+  app.add_option("--check-every", options.check_every,
+                 "With --glass: judge one of so many refreshes (default: 6), and each new frame "
+                 "at rest")
+      ->check(CLI::Range(1, 10'000));
+  app.add_option("--worst", options.scenario.check.worst_folder,
+                 "With --glass: folder for PNGs of the worst refreshes, shown and exact");
   app.add_option("--json", options.json, "Write the report here; - prints it instead");
   app.add_option("--html", options.html,
                  "Write a page with plots here (needs the built web client)");
@@ -93,10 +100,11 @@ Scenario scenario_of(const ProgramOptions& options) {
     if (options.url.empty()) throw InputError("--url, --scenario", "", "one of them is needed");
     scenario.load.groups = {options.group};
   } else {
-    scenario = read_scenario(options.file);
+    scenario = read_scenario(options.file, options.scenario.check.scenes);
+    scenario.check.worst_folder = options.scenario.check.worst_folder;
     for (const std::string& name : options.without) leave_out(name, scenario);
-    if (!options.scenario.check_scene.empty()) scenario.check_scene = options.scenario.check_scene;
   }
+  if (options.check_every > 0) scenario.check.every = options.check_every;
   if (options.duration_s >= 0.0) scenario.load.duration_s = options.duration_s;
   scenario.load.url = options.url;
   scenario.load.token = options.token;

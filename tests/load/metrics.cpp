@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <numeric>
+#include <ranges>
 
 #include <fmt/format.h>
 
 #include "render_core/base/error.h"
 #include "render_core/metrics/image_quality.h"
+#include "render_core/metrics/summary.h"
 #include "tests/load/options.h"
 #include "tests/load/units.h"
 
@@ -40,6 +44,7 @@ constexpr NamedCount counts[] = {{"frames", &Counts::frames},
 
 // A picture at rest with this much, of chroma at half the size too, is one that stays.
 constexpr double sharp_db = 38.0;
+constexpr double shown_sharp_db = 40.0;
 
 struct Range {
   double min = std::numeric_limits<double>::infinity(), mean = 0.0, max = 0.0;
@@ -112,6 +117,66 @@ void add_rests(const SessionReports& sessions, Metrics& metrics) {
                        none ? std::nan("") : times_ms[times_ms.size() / 2]);
   metrics.emplace_back("sharp_after_rest_max_ms", none ? std::nan("") : times_ms.back());
   metrics.emplace_back("still_psnr_min_db", none ? std::nan("") : worst_db);
+}
+
+/// The least value that `share` of the sorted ones do not exceed, 0 for the first; NaN for none.
+double quantile(const std::vector<double>& sorted, double share) {
+  if (sorted.empty()) return std::nan("");
+  return share > 0.0 ? percentile(sorted, share) : sorted.front();
+}
+
+/// From the start of a rest to the refresh from which pictures stay sharp until its end.
+double shown_sharp_after_ms(const SessionReport& session, int rest) {
+  double after_ms = std::numeric_limits<double>::infinity();
+  for (const JudgedRefresh& refresh : std::views::reverse(session.judged)) {
+    if (refresh.rest != rest) continue;
+    if (refresh.psnr_db < shown_sharp_db) break;
+    after_ms = 1e-3 * static_cast<double>(refresh.after_us);
+  }
+  return after_ms;
+}
+
+/// What the visitors saw, with --glass.
+void add_displays(const SessionReports& sessions, Metrics& metrics) {
+  std::vector<double> ssim, psnr_db, uncovered, ages_ms, freezes, sharp_ms;
+  for (const auto& session : sessions) {
+    if (!session->display) continue;
+    for (const JudgedRefresh& refresh : session->judged) {
+      if (!refresh.sampled) continue;
+      ssim.push_back(refresh.ssim);
+      psnr_db.push_back(refresh.psnr_db);
+      uncovered.push_back(100.0 * refresh.uncovered);
+    }
+    for (int rest = 1; rest <= session->rests; ++rest)
+      sharp_ms.push_back(shown_sharp_after_ms(*session, rest));
+    std::ranges::copy_if(pose_ages_ms(*session->display), std::back_inserter(ages_ms),
+                         [](double age_ms) { return !std::isnan(age_ms); });
+    std::ranges::copy(freezes_ms(*session->display), std::back_inserter(freezes));
+  }
+  for (std::vector<double>* values : {&ssim, &psnr_db, &ages_ms, &freezes, &sharp_ms})
+    std::ranges::sort(*values);
+  const auto sum = [](const std::vector<double>& v) {
+    return std::accumulate(v.begin(), v.end(), 0.0);
+  };
+  const auto mean = [&](const std::vector<double>& v) {
+    return v.empty() ? std::nan("") : sum(v) / static_cast<double>(v.size());
+  };
+  metrics.insert(metrics.end(), {{"display_refreshes", static_cast<double>(ssim.size())},
+                                 {"display_ssim_mean", mean(ssim)},
+                                 {"display_ssim_p5", quantile(ssim, 0.05)},
+                                 {"display_ssim_min", quantile(ssim, 0.0)},
+                                 {"display_psnr_mean_db", mean(psnr_db)},
+                                 {"display_psnr_p5_db", quantile(psnr_db, 0.05)},
+                                 {"display_psnr_min_db", quantile(psnr_db, 0.0)},
+                                 {"display_uncovered_percent", mean(uncovered)},
+                                 {"display_age_p50_ms", quantile(ages_ms, 0.5)},
+                                 {"display_age_p95_ms", quantile(ages_ms, 0.95)},
+                                 {"display_age_max_ms", quantile(ages_ms, 1.0)},
+                                 {"display_freezes", static_cast<double>(freezes.size())},
+                                 {"display_frozen_ms", sum(freezes)},
+                                 {"display_freeze_max_ms", freezes.empty() ? 0.0 : freezes.back()},
+                                 {"display_40db_after_rest_p50_ms", quantile(sharp_ms, 0.5)},
+                                 {"display_40db_after_rest_max_ms", quantile(sharp_ms, 1.0)}});
 }
 
 Metrics window_metrics(const SeriesBin& bin, double bin_s, std::size_t sessions) {
@@ -192,6 +257,7 @@ Metrics collect_metrics(const SessionReports& sessions, double nominal_fps,
   add("bitrate_kbps_max", bitrate.max);
   add_pictures(sessions, metrics);
   add_rests(sessions, metrics);
+  add_displays(sessions, metrics);
   for (const NamedCount& count : counts) {
     double sum = 0.0;
     for (const auto& session : sessions)

@@ -1,10 +1,63 @@
 #include "tests/load/options.h"
 
-#include <CLI/CLI.hpp>
+#include <charconv>
+#include <map>
+#include <string_view>
 
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "render_core/base/error.h"
 #include "tests/load/units.h"
 
 namespace catgs::load {
+namespace {
+
+/// "1.26x1.12"
+glm::dvec2 parse_overscan(const std::string& text) {
+  glm::dvec2 sides(0.0);
+  const std::size_t by = std::min(text.find('x'), text.size());
+  const std::string_view parts[] = {std::string_view(text).substr(0, by),
+                                    std::string_view(text).substr(std::min(by + 1, text.size()))};
+  for (int i = 0; i < 2; ++i) {
+    const char* end = parts[i].data() + parts[i].size();
+    const auto [stop, error] = std::from_chars(parts[i].data(), end, sides[i]);
+    if (error != std::errc() || stop != end || !(sides[i] >= 1.0 && sides[i] <= 2.0)) {
+      throw InputError("--overscan", "", fmt::format("\"{}\" is not two factors of 1 to 2", text),
+                       "like 1.26x1.12");
+    }
+  }
+  return sides;
+}
+
+/// Returns the option of the whole.
+CLI::Option* add_display_options(CLI::App& app, DisplayOptions& display) {
+  const std::map<std::string, WarpMode> warps = {{"auto", WarpMode::automatic},
+                                                 {"turn", WarpMode::turn},
+                                                 {"plane", WarpMode::plane},
+                                                 {"off", WarpMode::off}};
+  auto* glass = app.add_flag("--glass", display.judged,
+                             "Show frames as the page does, and judge what is shown by the exact "
+                             "picture of the visitor's pose; needs --check-scene");
+  app.add_option("--display-hz", display.hz, "Refreshes, and poses: 60 or 120 as a rule")
+      ->check(CLI::Range(24, 240))
+      ->capture_default_str()
+      ->needs(glass);
+  app.add_option("--warp", display.warp,
+                 "Of the newest picture to the newest pose: turn, plane (at the scene's focus), "
+                 "off, or auto: as the page does for the script")
+      ->transform(CLI::Transformer(warps))
+      ->needs(glass);
+  app.add_option_function<std::string>(
+         "--overscan",
+         [&display](const std::string& text) { display.overscan = parse_overscan(text); },
+         "Sides of pictures over those of the view, such as 1.26x1.12 (default: by the motion, as "
+         "the page)")
+      ->needs(glass);
+  return glass;
+}
+
+}  // namespace
 
 CLI::Option* add_duration(CLI::App& app, const std::string& flag, double& seconds,
                           const std::string& help) {
@@ -52,10 +105,12 @@ void add_client_options(CLI::App& app, GroupOptions& group) {
       "--link", [&group](const std::string& text) { group.link = parse_link("--link", text); },
       "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"
       "loss=1%,burst=4,queue=200ms,congestion=cubic; each part may be left out");
+  auto* glass = add_display_options(app, group.display);
   auto* decode = app.add_flag("--decode", manners.decode, "Decode every frame and check its size");
   app.add_flag("--only-pictures", manners.only_pictures,
                "Decode only what is compared with --check-scene, from an IDR of its own on")
-      ->needs(decode);
+      ->needs(decode)
+      ->excludes(glass);
   add_duration(app, "--decode-time", manners.decode_time_s, "Play a decoder that takes this long");
   app.add_flag("--acks,!--no-acks", manners.acknowledge,
                "Whether frames are acknowledged: without, the server must stop sending");

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <glm/vec2.hpp>
 
 #include "render_core/base/cli_fwd.h"
 #include "render_core/motion/script.h"
@@ -37,6 +40,18 @@ struct Manners {
   double stall_for_s = 0.0;  // … for this long; 0: no stall
 };
 
+/// How the page's newest picture is warped to its newest camera.
+enum class WarpMode { automatic, turn, plane, off };
+
+/// What a client shows, and how, as the page does.
+struct DisplayOptions {
+  bool judged = false;  // by exact pictures, after the run
+  int hz = 60;
+  WarpMode warp = WarpMode::automatic;  // as in the page's mode: plane for orbits, else turn
+  // Sides of pictures over those of the view; nothing: chosen by the motion, as the page does.
+  std::optional<glm::dvec2> overscan{};
+};
+
 /// Clients that are alike. Times are seconds since the run began.
 struct GroupOptions {
   std::string name = unnamed_group;
@@ -55,6 +70,7 @@ struct GroupOptions {
 
   Wishes wishes;
   Manners manners;
+  DisplayOptions display;
   LinkSettings link;
 };
 

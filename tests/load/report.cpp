@@ -20,6 +20,20 @@ std::map<std::string, std::uint64_t> all_errors(const SessionReports& sessions) 
   return errors;
 }
 
+Json display_json(const std::vector<JudgedRefresh>& judged) {
+  Json json;
+  for (const JudgedRefresh& refresh : judged) {
+    json["at_s"].push_back(refresh.at_s);
+    json["ssim"].push_back(refresh.ssim);
+    json["psnr_db"].push_back(refresh.psnr_db);
+    json["uncovered"].push_back(refresh.uncovered);
+    json["age_ms"].push_back(refresh.age_ms);
+    json["rest"].push_back(refresh.rest);
+    json["sampled"].push_back(refresh.sampled);
+  }
+  return json;
+}
+
 Json session_json(const SessionReport& session, double nominal_fps, const HoldBounds& bounds) {
   const SessionStats& stats = session.stats;
   Json json = {{"connected", stats.connected},
@@ -31,6 +45,7 @@ Json session_json(const SessionReport& session, double nominal_fps, const HoldBo
                {"pose_age_p95_ms", stats.durations.pose_age.percentile_ms(0.95)},
                {"frame_interval_p99_ms", stats.durations.frame_interval.percentile_ms(0.99)},
                {"psnr_db", mean_psnr_db(session)}};
+  if (session.display) json["display"] = display_json(session.judged);
   for (const NamedCount& count : named_counts()) json[count.name] = stats.counts.*count.member;
   return json;
 }
@@ -112,8 +127,48 @@ Json to_json(const RunReport& report, const Metrics& metrics, const HoldBounds& 
   return json;
 }
 
+PaperTable display_table(const RunReport& report, const HoldBounds& bounds) {
+  struct Column {
+    const char *title, *metric;
+    int decimals;
+  };
+  constexpr Column columns[] = {{"SSIM mean", "display_ssim_mean", 3},
+                                {"p5", "display_ssim_p5", 3},
+                                {"min", "display_ssim_min", 3},
+                                {"PSNR dB mean", "display_psnr_mean_db", 1},
+                                {"p5", "display_psnr_p5_db", 1},
+                                {"min", "display_psnr_min_db", 1},
+                                {"uncovered %", "display_uncovered_percent", 2},
+                                {"pose age ms p50", "display_age_p50_ms", 0},
+                                {"p95", "display_age_p95_ms", 0},
+                                {"freezes", "display_freezes", 0},
+                                {"longest ms", "display_freeze_max_ms", 0},
+                                {"40 dB after rest ms", "display_40db_after_rest_max_ms", 0},
+                                {"frames/s", "fps_mean", 1},
+                                {"kbit/s", "bitrate_kbps_mean", 0}};
+  PaperTable table{.corner = "clients"};
+  for (const Column& column : columns) table.columns.emplace_back(column.title);
+  for (const GroupReport& group : report.groups) {
+    const Metrics metrics = collect_metrics(group.sessions, group.nominal_fps, bounds);
+    if (!(value_of(metrics, "display_refreshes") > 0.0)) continue;
+    PaperTable::Row& row = table.rows.emplace_back(group.name);
+    for (const Column& column : columns)
+      row.numbers.push_back({value_of(metrics, column.metric), column.decimals});
+  }
+  table.notes = {"SSIM: luma, 11x11 Gaussian window. PSNR: RGB, at most 60 dB."};
+  return table;
+}
+
 std::string to_table(const RunReport& report, const HoldBounds& bounds) {
   std::string text;
+  if (const PaperTable displays = display_table(report, bounds); !displays.rows.empty()) {
+    text = markdown(displays);
+    for (const GroupReport& group : report.groups) {
+      for (const auto& [what, count] : all_errors(group.sessions))
+        text += fmt::format("{}: {} x {}\n", group.name, count, what);
+    }
+    return text;
+  }
   for (const GroupReport& group : report.groups) {
     if (report.groups.size() > 1) text += fmt::format("\n-- {} --\n", group.name);
     append_table(group, bounds, text);

@@ -7,6 +7,7 @@
 
 #include "render_core/math/camera.h"
 #include "server/encode/decoder.h"
+#include "tests/load/display.h"
 #include "tests/load/session_stats.h"
 #include "tests/load/time_series.h"
 
@@ -42,6 +43,8 @@ struct SessionReport {
   std::optional<RestingCamera> rest;
   int rests = 0;  // that lasted
   glm::ivec2 still_size_px{0};
+  std::optional<DisplayLog> display;  // with --glass
+  std::vector<JudgedRefresh> judged;  // once check_displays() has looked at it
 };
 
 using SessionReports = std::vector<std::unique_ptr<SessionReport>>;

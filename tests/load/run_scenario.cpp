@@ -33,11 +33,16 @@ void check_names(const std::vector<Requirement>& requirements, const Scenario& s
       continue;
     }
     requirement.check_name(metrics);
-    if (name.ends_with("held") && scenario.check_scene.empty()) {
+    if (name.ends_with("held") && scenario.check.scenes.empty()) {
       throw InputError("--require", name, "needs pictures to be compared",
                        "--check-scene names the server's scene, --decode decodes");
     }
   }
+}
+
+bool judges_displays(const Scenario& scenario) {
+  return std::ranges::any_of(scenario.load.groups,
+                             [](const GroupOptions& group) { return group.display.judged; });
 }
 
 /// Signals of the scenario as actions of the run.
@@ -64,6 +69,10 @@ bool Outcome::all_hold() const {
 Outcome run_scenario(Scenario scenario, const std::vector<std::string>& server_command,
                      const std::filesystem::path& server_log) {
   Outcome outcome;
+  if (judges_displays(scenario) && scenario.check.scenes.empty()) {
+    throw InputError("--glass", "", "needs exact pictures to compare with",
+                     "--check-scene names the server's scene");
+  }
   for (const std::string& text : scenario.requirements) outcome.requirements.emplace_back(text);
   std::unique_ptr<ServerProcess> server;
   if (scenario.load.url.empty()) {
@@ -75,14 +84,15 @@ Outcome run_scenario(Scenario scenario, const std::vector<std::string>& server_c
   }
   check_names(outcome.requirements, scenario, server.get());
   scenario.load.actions = actions_of(scenario, server.get());
-  scenario.load.pictures = scenario.check_scene.empty() ? 0 : scenario.pictures;
+  scenario.load.pictures = scenario.check.scenes.empty() ? 0 : scenario.pictures;
   outcome.report = run_load(scenario.load);
   if (server) {
     server->end_measuring();
     server->stop();
     outcome.usage = server->usage();
   }
-  if (!scenario.check_scene.empty()) check_pictures(scenario.check_scene, outcome.report);
+  if (!scenario.check.scenes.empty()) check_pictures(scenario.check.scenes, outcome.report);
+  if (judges_displays(scenario)) check_displays(scenario.check, outcome.report);
   outcome.metrics = collect_metrics(outcome.report, scenario.bounds);
   if (server) append(outcome.metrics, server->metrics());
   for (const Requirement& requirement : outcome.requirements) {

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <map>
 #include <set>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -11,6 +12,8 @@
 
 #include "render_core/base/error.h"
 #include "render_core/base/nearest_name.h"
+#include "tests/load/clock.h"
+#include "tests/load/picture_check.h"
 
 namespace catgs::load {
 namespace {
@@ -79,16 +82,67 @@ std::vector<const toml::table*> tables_of(const std::string& path, const toml::t
   return tables;
 }
 
-GroupOptions read_group(const std::filesystem::path& path, const toml::table& table) {
-  GroupOptions group;
+/// Sets what the table says.
+void read_group(const std::filesystem::path& path, const toml::table& table, GroupOptions& group) {
   CLI::App options;
   add_client_options(options, group);
   options.add_option("--name", group.name);
   add_duration(options, "--start", group.start_s);
   add_duration(options, "--end", group.end_s);
   read_values(path.string(), table, options);
+  if (!table.contains("trace") && !table.contains("traces")) return;
   for (std::string& trace : group.traces) trace = (path.parent_path() / trace).string();
-  return group;
+}
+
+/// What a row of a matrix is called and adds to its clients.
+struct MatrixEntry {
+  const toml::table* table;
+  std::string name;
+};
+
+std::vector<MatrixEntry> entries_of(const std::string& path, const toml::table& matrix,
+                                    const char* axis) {
+  std::vector<MatrixEntry> entries;
+  for (const toml::table* table : tables_of(path, matrix, axis)) {
+    const auto name = (*table)["name"].value<std::string>();
+    if (!name) throw mistake(path, *table, fmt::format("a {} of a matrix needs a name", axis));
+    entries.push_back({table, *name});
+  }
+  if (entries.empty())
+    throw mistake(path, matrix, fmt::format("a matrix needs a [[matrix.{}]]", axis));
+  return entries;
+}
+
+/// Each combination of scene, trace and link as a group of its own, one after the other. The server
+/// gets the scenes.
+void read_matrix(const std::filesystem::path& path, const toml::table& matrix,
+                 const toml::table& clients, Scenario& scenario) {
+  const std::string name = path.string();
+  double row_s = 10.0;
+  CLI::App options;
+  add_duration(options, "--row", row_s);
+  read_values(name, matrix, options, {"trace", "link"});
+  if (scenario.check.scenes.empty()) throw mistake(name, matrix, "a matrix needs check-scene");
+  for (const std::string& scene : scenario.check.scenes) {
+    scenario.server_args.insert(scenario.server_args.end(), {"--scene", scene});
+    for (const MatrixEntry& trace : entries_of(name, matrix, "trace")) {
+      for (const MatrixEntry& link : entries_of(name, matrix, "link")) {
+        GroupOptions group;
+        for (const toml::table* table : {&clients, trace.table, link.table})
+          read_group(path, *table, group);
+        group.wishes.scene = scene_name(scene);
+        group.name = fmt::format("{}/{}/{}", group.wishes.scene, trace.name, link.name);
+        group.start_s = row_s * static_cast<double>(scenario.load.groups.size());
+        group.end_s = group.start_s + row_s;
+        for (RateSchedule* rate : {&group.link.down, &group.link.up}) {
+          for (RateStep& step : *rate)  // the first holds from the run's begin on
+            if (step.from_us > 0) step.from_us += microseconds(group.start_s);
+        }
+        scenario.load.groups.push_back(std::move(group));
+      }
+    }
+  }
+  scenario.load.duration_s = scenario.load.groups.back().end_s;
 }
 
 ServerSignal read_signal(const std::string& path, const toml::table& table) {
@@ -104,7 +158,8 @@ ServerSignal read_signal(const std::string& path, const toml::table& table) {
 
 }  // namespace
 
-Scenario read_scenario(const std::filesystem::path& path) {
+Scenario read_scenario(const std::filesystem::path& path,
+                       const std::vector<std::string>& check_scenes) {
   const std::string name = path.string();
   const toml::table table = [&] {
     try {
@@ -119,9 +174,11 @@ Scenario read_scenario(const std::filesystem::path& path) {
   options.add_option("--title", scenario.title);
   add_duration(options, "--duration", scenario.load.duration_s);
   options.add_option("--require", scenario.requirements);
-  options.add_option("--check-scene", scenario.check_scene);
+  options.add_option("--check-scene", scenario.check.scenes);
+  options.add_option("--check-every", scenario.check.every)->check(CLI::Range(1, 10'000));
   options.add_option("--pictures", scenario.pictures)->check(CLI::Range(1, 256));
-  read_values(name, table, options, {"held", "server", "clients"});
+  read_values(name, table, options, {"held", "server", "clients", "matrix"});
+  if (!check_scenes.empty()) scenario.check.scenes = check_scenes;
   for (const toml::table* held : tables_of(name, table, "held")) {
     CLI::App bounds;
     bounds.add_option("--pose-to-frame-p95-ms", scenario.bounds.pose_to_frame_p95_ms);
@@ -136,8 +193,16 @@ Scenario read_scenario(const std::filesystem::path& path) {
     for (const toml::table* signal : tables_of(name, *server, "signals"))
       scenario.signals.push_back(read_signal(name, *signal));
   }
-  for (const toml::table* clients : tables_of(name, table, "clients"))
-    scenario.load.groups.push_back(read_group(path, *clients));
+  const auto matrices = tables_of(name, table, "matrix"),
+             groups = tables_of(name, table, "clients");
+  if (!matrices.empty() && groups.size() > 1)
+    throw mistake(name, *groups[1], "a matrix has one [[clients]], for all of its rows");
+  for (const toml::table* clients : groups) {
+    if (matrices.empty())
+      read_group(path, *clients, scenario.load.groups.emplace_back());
+    else
+      read_matrix(path, *matrices[0], *clients, scenario);
+  }
   if (scenario.load.groups.empty()) throw InputError(name, "", "has no [[clients]]");
   return scenario;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/load/display_check.h"
 #include "tests/load/metrics.h"
 #include "tests/load/options.h"
 
@@ -21,14 +22,15 @@ struct Scenario {
   LoadOptions load;
   std::vector<std::string> server_args;  // of a server that the run starts for itself
   std::vector<ServerSignal> signals;
-  std::string check_scene;  // file or synth:…, to compare decoded pictures with; empty: none are
-  int pictures = 32;        // of them, in all
+  DisplayCheck check;  // without scenes nothing is compared
+  int pictures = 32;   // decoded ones to compare, in all
   HoldBounds bounds;
   std::vector<std::string> requirements;
 };
 
-/// Reads a TOML file; README.md lists its keys. Paths in it are relative to it. Throws InputError
-/// with the line of a mistake.
-Scenario read_scenario(const std::filesystem::path& path);
+/// Reads a TOML file; README.md lists its keys. Paths in it are relative to it. `check_scenes`
+/// replace its own. Throws InputError with the line of a mistake.
+Scenario read_scenario(const std::filesystem::path& path,
+                       const std::vector<std::string>& check_scenes = {});
 
 }  // namespace catgs::load

@@ -85,6 +85,66 @@ TEST_F(ScenarioFile, NamesTheLineOfAMistake) {
   expect_refused("[[clients]\n", "line 1");
 }
 
+TEST_F(ScenarioFile, AMatrixHasARowForEachCombination) {
+  const std::string text = R"(
+check-scene = ["synth:city:100", "synth:garden:100"]
+[matrix]
+row = "5s"
+[[matrix.trace]]
+name = "head"
+script = "head"
+[[matrix.trace]]
+name = "recorded"
+trace = "t.tum"
+sizes = ["320x180"]
+[[matrix.link]]
+name = "clean"
+[[matrix.link]]
+name = "step"
+link = "rate=5mbit,1mbit@2s"
+[[clients]]
+glass = true
+sizes = ["160x90"]
+)";
+  const Scenario scenario = read(text);
+  EXPECT_EQ(scenario.load.duration_s, 40.0);
+  EXPECT_THAT(scenario.server_args,
+              ElementsAre("--scene", "synth:city:100", "--scene", "synth:garden:100"));
+  ASSERT_EQ(scenario.load.groups.size(), 8u);
+  const GroupOptions& row = scenario.load.groups[3];
+  EXPECT_EQ(row.name, "city/recorded/step");
+  EXPECT_EQ(row.wishes.scene, "city");
+  EXPECT_TRUE(row.display.judged);
+  EXPECT_EQ(row.traces, std::vector<std::string>{(folder_ / "t.tum").string()});
+  EXPECT_EQ(row.sizes, std::vector<std::string>{"320x180"});
+  EXPECT_EQ(row.start_s, 15.0);
+  EXPECT_EQ(row.end_s, 20.0);
+  ASSERT_EQ(row.link.down.size(), 2u);
+  EXPECT_EQ(row.link.down[0].from_us, 0) << "rates count from the row's begin";
+  EXPECT_EQ(row.link.down[1].from_us, 17'000'000);
+  EXPECT_EQ(scenario.load.groups[4].name, "garden/head/clean");
+  const std::vector<std::string> other = {"synth:stress:100"};
+  EXPECT_EQ(read_scenario(folder_ / "s.toml", other).load.groups.size(), 4u);
+
+  expect_refused("[matrix]\n[[clients]]\n", "a matrix needs check-scene");
+  expect_refused("[matrix]\n[[clients]]\n[[clients]]\n", "line 3: a matrix has one [[clients]]");
+  expect_refused("check-scene = \"synth:city:1\"\n[[matrix.trace]]\nname = \"a\"\n[[clients]]\n",
+                 "a matrix needs a [[matrix.link]]");
+  expect_refused("check-scene = \"synth:city:1\"\n[[matrix.trace]]\n[[clients]]\n",
+                 "line 2: a trace of a matrix needs a name");
+}
+
+TEST_F(ScenarioFile, OverscanIsTwoFactors) {
+  const auto overscan = [&](const std::string& value) {
+    return read("[[clients]]\nglass = true\noverscan = \"" + value + "\"\n")
+        .load.groups[0]
+        .display.overscan;
+  };
+  EXPECT_EQ(overscan("1.26x1.12"), glm::dvec2(1.26, 1.12));
+  for (const char* bad : {"1.26", "x", "0.9x1", "1x3", "1x1x1", "nanx1", ""})
+    EXPECT_THROW(overscan(bad), InputError) << bad;
+}
+
 TEST(ServerMetrics, ChangesBetweenTwoAnswersAreMeasured) {
   const auto answer = [](int fast, int all, double sum_s, int frames, int sessions) {
     return nlohmann::ordered_json{
@@ -117,7 +177,7 @@ DecodedPicture grey(std::uint8_t luma, std::uint8_t cb, std::uint8_t cr, bool fu
 
 TEST(PictureCheck, ColoursOfBothRanges) {
   const auto expect_pixel = [](const DecodedPicture& picture, float r, float g, float b) {
-    const std::vector<float> rgb = rgb_of(picture);
+    const std::vector<float> rgb = rgb_of(picture).rgb;
     ASSERT_EQ(rgb.size(), 12u);
     EXPECT_NEAR(rgb[9], r, 0.01f);
     EXPECT_NEAR(rgb[10], g, 0.01f);
@@ -128,6 +188,32 @@ TEST(PictureCheck, ColoursOfBothRanges) {
   expect_pixel(grey(63, 102, 240, false), 1, 0, 0);  // BT.709 red
   expect_pixel(grey(255, 128, 128, true), 1, 1, 1);
   expect_pixel(grey(76, 85, 255, true), 1, 0, 0);  // JFIF red
+}
+
+TEST(ChartDocument, DisplaysOfOneMotionShareAPlot) {
+  Outcome outcome;
+  for (const char* name : {"city/head/clean", "city/head/step"}) {
+    GroupReport& group = outcome.report.groups.emplace_back();
+    group.name = name;
+    group.series = std::make_unique<TimeSeries>(0);
+    group.sessions.push_back(std::make_unique<SessionReport>(60.0, group.series.get()));
+    SessionReport& session = *group.sessions[0];
+    session.rests = 1;
+    session.display.emplace();
+    session.judged = {{.at_s = 0.5, .ssim = 0.9, .psnr_db = 30.0, .sampled = true},
+                      {.at_s = 1.0, .ssim = 0.8, .psnr_db = 28.0, .rest = 1}};
+  }
+  const auto displays = chart_document({}, outcome).at("parts").at(0);
+  const auto& row = displays.at("table").at("rows").at(1);
+  EXPECT_EQ(row.at(0), "city/head/step");
+  EXPECT_EQ(row.at(1), 0.9);
+  EXPECT_EQ(row.at(12), "∞") << "it never became sharp";
+  const auto& plots = displays.at("plots");
+  ASSERT_EQ(plots.size(), 4u);
+  EXPECT_EQ(plots.at(0).at("title"), "city/head: SSIM over time");
+  const auto& curve = plots.at(0).at("curves").at(1);
+  EXPECT_EQ(curve.at("name"), "step");
+  EXPECT_EQ(curve.at("y"), nlohmann::json::array({0.9}));
 }
 
 TEST(ChartDocument, HasPlotsTablesAndAnEscapedPlaceInThePage) {

@@ -30,6 +30,7 @@ struct SessionSettings {
   std::string token;
   Wishes wishes;
   Manners manners;
+  DisplayOptions display;  // `warp` as it is meant
   glm::ivec2 size_px{0};
   glm::ivec2 moving_size_px{0};  // 0: the same
   MakeTrajectory make_trajectory;

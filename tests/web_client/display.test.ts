@@ -1,10 +1,11 @@
 import { beforeEach, describe, expect, it } from 'vitest';
-import { axis_angle, identity, type Quat } from '#client/base/vector';
+import { axis_angle, identity, multiply, type Quat } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
 import { warped, widened_fov } from '#client/present/warp';
+import golden from '../support/warp_golden.json';
 
 const at = (yaw: number): Eye => {
   const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);
@@ -108,6 +109,33 @@ describe('the display', () => {
       if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
     }
     expect(display.overscan.x).toBeGreaterThanOrEqual(1.26);
+  });
+
+  // tests/load/display_test.cpp holds catgs-load to the same choices.
+  it('asks for the overscan of the shared turns', async () => {
+    const changes = [];
+    let [begin_s, refresh, before] = [0, 0, display.overscan];
+    for (const turn of golden.turns) {
+      const at_time = (s: number): Eye => {
+        const phase = (2 * Math.PI * Math.max(0, s)) / turn.period_s;
+        const yaw = axis_angle([0, -1, 0], turn.yaw_rad * Math.sin(phase));
+        const pitch = axis_angle([1, 0, 0], turn.pitch_rad * Math.sin(2 * phase));
+        return { ...at(0), orientation: multiply(yaw, pitch) };
+      };
+      for (let i = 1; i <= 60 * turn.seconds; ++i, ++refresh) {
+        const s = i / 60;
+        now_us = Math.round((begin_s + s) * 1e6);
+        display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
+        const { x, y } = display.overscan;
+        const eye = { ...at_time(s - turn.lag_s), fov_y_rad: widened_fov(1, y) };
+        await display.draw(picture, eye, 640 * x, 360 * y);
+        if (display.overscan === before) continue;
+        before = display.overscan;
+        changes.push({ refresh, ...before });
+      }
+      begin_s += turn.seconds;
+    }
+    expect(changes).toEqual(golden.overscans);
   });
 
   it('does not warp where that is off, or cannot be', async () => {

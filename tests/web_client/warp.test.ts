@@ -13,6 +13,7 @@ import { project } from '#client/camera/ray';
 import { TurnForecast } from '#client/present/turn_forecast';
 import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
+import golden from '../support/warp_golden.json';
 
 const aspect = 16 / 9;
 const up: Vec3 = [0, -1, 0];
@@ -87,6 +88,26 @@ describe('a warped picture', () => {
     const behind = warp_matrix(eye(), eye({ orientation: axis_angle(up, 3) }), aspect, Infinity);
     expect(reach(behind)).toEqual({ x: 4, y: 4 });
     expect(uncovered_share(behind)).toBe(1);
+  });
+});
+
+// tests/load/display_test.cpp holds the warp of catgs-load to the same numbers.
+describe.each(golden.warps)('the warp: $name', (warp) => {
+  const m = warp_matrix(
+    warp.picture as unknown as Eye,
+    warp.view as unknown as Eye,
+    warp.picture_aspect,
+    warp.distance ?? Infinity,
+    warp.view_aspect,
+  );
+
+  it('is that of the shared numbers', () => {
+    const close = (values: readonly number[]): unknown[] =>
+      values.map((v): unknown => expect.closeTo(v, 5));
+    expect([...m]).toEqual(close(warp.matrix));
+    expect(warped(m, 1, -1) ?? null).toEqual(warp.corner && close(warp.corner));
+    expect(Object.values(reach(m))).toEqual(close(warp.reach));
+    expect(uncovered_share(m)).toBeCloseTo(warp.uncovered, 6);
   });
 });
 

@@ -73,6 +73,7 @@ void print_json(const ImageQuality& quality, const CameraCheck& cameras) {
   const nlohmann::ordered_json json = {
       {"psnr_db", quality.psnr()},
       {"ssim", quality.ssim},
+      {"ssim_luma", quality.ssim_luma},
       {"max_error", quality.max_error},
       {"worst_block_psnr_db", quality.worst_block_psnr()},
       {"block_0_1_percent_psnr_db", quality.block_0_1_percent_psnr()},
@@ -84,6 +85,7 @@ void print_table(const ImageQuality& quality) {
   fmt::print("PSNR               {:8.2f} dB\n", quality.psnr());
   fmt::print("SSIM               {:8.5f}     (11x11 Gaussian window, mean of R, G, B)\n",
              quality.ssim);
+  fmt::print("SSIM of luma       {:8.5f}\n", quality.ssim_luma);
   fmt::print("largest error      {:8.1f} / 255\n", 255.0 * quality.max_error);
   fmt::print("worst 16x16 block  {:8.2f} dB\n", quality.worst_block_psnr());
   fmt::print("0.1 % block        {:8.2f} dB\n", quality.block_0_1_percent_psnr());

@@ -102,6 +102,19 @@ TEST(ImageQuality, SsimFollowsItsDefinition) {
   EXPECT_NEAR(compare_images(b, a).ssim, expected, 1e-9);
 }
 
+TEST(ImageQuality, SsimOfLumaIsThatOfGreyPictures) {
+  const auto grey = [](Image image) {
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+      float* rgb = &image.rgb[i];
+      rgb[0] = rgb[1] = rgb[2] = 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+    }
+    return image;
+  };
+  const Image a = noise(23, 17, 2), b = noise(23, 17, 3);
+  EXPECT_NEAR(luma_ssim(a, b), compare_images(grey(a), grey(b)).ssim, 1e-5);
+  EXPECT_EQ(compare_images(a, b).ssim_luma, luma_ssim(a, b));
+}
+
 TEST(ImageQuality, FindsOneFaultyBlockAndCutsTheEdges) {
   const Image a{{1000, 1000}, std::vector<float>(3'000'000, 0.5f)};  // 63 x 63 blocks
   Image b = a;

@@ -18,6 +18,8 @@ export interface Curve {
 export interface Plot {
   readonly title: string;
   readonly unit: string;
+  /** Where the y axis begins, unless a value is less; 0 without it. */
+  readonly floor?: number;
   readonly curves: readonly Curve[];
   /** Linear without it. */
   readonly x?: 'log' | 'dates';

@@ -80,7 +80,12 @@ function draw(plot: Plot, host: HTMLElement): void {
               }
             : {}),
         },
-        y: { range: (_, _low, high) => [0, Math.max(high * 1.05, 1e-3)] },
+        y: {
+          range: (_, low, high) => [
+            Math.min(plot.floor ?? 0, Math.max(0, low)),
+            Math.max(high * 1.05, 1e-3),
+          ],
+        },
       },
       tzDate: (time_s) => uPlot.tzDate(new Date(1e3 * time_s), 'UTC'),
       axes: [axis({}), axis({ label: plot.unit, labelSize: 18 })],

@@ -1,4 +1,5 @@
-// Warps a picture to a camera that has moved since the picture was rendered. Pure.
+// Warps a picture to a camera that has moved since the picture was rendered. tests/load/warp.cpp repeats
+// it for benchmarks. Pure.
 import { conjugate, multiply, rotate, scale, sub, type Vec3 } from '../base/vector';
 import { limited_fov, type Eye } from '../camera/eye';
 
