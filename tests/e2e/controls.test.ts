@@ -1,9 +1,10 @@
 // Each control by each input device, against a server that follows a script.
-import type { CDPSession, Page } from 'playwright-core';
+import type { CDPSession, Locator, Page } from 'playwright-core';
 import { afterEach, beforeAll, describe, expect, it } from 'vitest';
 import { rotate, sub, conjugate, type Vec3 } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
-import { open as open_page, type WatchedPage } from './support/browser';
+import { barriers } from './support/axe';
+import { keep_screenshot, open as open_page, windows, type WatchedPage } from './support/browser';
 import { pose_of, settle } from './support/camera';
 import { start_fake_server, type FakeServer } from './support/fake_server';
 import { plug_in_gamepad } from './support/gamepad';
@@ -214,6 +215,72 @@ describe('the mouse', () => {
   });
 });
 
+describe('the field of view', () => {
+  it('is chosen by keys, follows stops and links, and goes back to that of the scene', async () => {
+    const stop = (title: string, z: number, more: object) => ({
+      title,
+      position: [0, 0, z],
+      look_at: [0, 0, 0],
+      fly_s: 0.1,
+      ...more,
+    });
+    const stops = [
+      stop('Detail', -3, { fov_deg: 35 }),
+      stop('Hall', -4, {}),
+      stop('Garden', -9, { fly_s: 60 }),
+    ];
+    const { url, peers } = await start_fake_server(stream_of(await painted_jpeg()), {
+      tours: [{ title: 'Lenses', stops }],
+    });
+    watched = await open_page(url, windows.desktop);
+    let { page } = watched;
+    const slider = (): Locator => page.getByRole('slider', { name: 'Field of view' });
+    const asked_deg = (): number => {
+      const asked = peers
+        .at(-1)!
+        .heard.flatMap((body) => (body.case === 'pose' ? [body.value] : []));
+      return (asked.at(-1)!.fovYRad * 180) / Math.PI;
+    };
+    const expect_deg = async (deg: number): Promise<void> => {
+      await expect.poll(() => slider().getAttribute('aria-valuetext')).toBe(`${deg}°`);
+      await expect.poll(asked_deg).toBeCloseTo(deg, 1);
+      expect(await slider().inputValue()).toBe(String(deg));
+    };
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    await slider().press('ArrowRight');
+    await expect_deg(61);
+    await slider().press('End');
+    await expect_deg(110);
+    expect(await barriers(page)).toEqual([]);
+    await keep_screenshot(page, 'field-of-view');
+    const to_next_stop = (): Promise<void> =>
+      page.getByRole('button', { name: 'Next stop' }).click();
+    await to_next_stop();
+    await expect_deg(35);
+    await slider().press('ArrowRight');
+    await expect_deg(36);
+    await page.getByRole('button', { name: 'Share' }).click();
+    const address = await page.locator('#share-link').inputValue();
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    await to_next_stop();
+    await expect_deg(60);
+    await to_next_stop();
+    await slider().press('End');
+    await expect_deg(110); // the flight has ended
+    expect(watched.errors).toEqual([]);
+    watched = await open_page(address, windows.desktop);
+    ({ page } = watched);
+    await page.getByRole('button', { name: 'Quality and view' }).click();
+    await expect_deg(36);
+    await to_next_stop();
+    await expect_deg(60); // the stop has none of its own
+    await slider().press('Home');
+    await expect_deg(20);
+    await page.getByRole('button', { name: "The scene's own field of view" }).press('Enter');
+    await expect_deg(60);
+  });
+});
+
 describe('which way is up', () => {
   it('is set by quarter turns, and by the surface in the middle of the view', async () => {
     const page = await open();
@@ -292,7 +359,7 @@ describe('fingers', () => {
     );
     await page.getByRole('button', { name: 'Quality and view' }).tap();
     expect(await page.locator('#quality-panel').isVisible()).toBe(true);
-    await page.getByLabel('Field of view').fill('90');
+    await page.getByRole('slider', { name: 'Field of view' }).fill('90');
     await page.locator('#view-fov-value', { hasText: '90°' }).waitFor();
   });
 

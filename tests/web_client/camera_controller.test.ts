@@ -229,6 +229,22 @@ describe('any mode', () => {
     expect(made.speed).toBe(1 / 16);
   });
 
+  it("knows the scene's own field of view, whatever the visitor has chosen", () => {
+    const made = camera('fly');
+    for (const [chosen, own] of [
+      [1.5, Math.PI / 3],
+      [0.5, 0.9],
+    ] as const) {
+      if (own === 0.9) made.start_at({ ...made.eye, fov_y_rad: own });
+      made.fov_y_rad = chosen;
+      expect(made.start_fov_y_rad).toBeCloseTo(own, 9);
+      expect(made.start!.fov_y_rad).toBeCloseTo(own, 9);
+      expect(made.fov_y_rad).toBe(chosen);
+      made.reset();
+      expect(made.fov_y_rad).toBeCloseTo(own, 9);
+    }
+  });
+
   it('turns a scene that lies on its side, and its start', () => {
     const made = camera('fly');
     made.turn_up(Math.PI / 2);

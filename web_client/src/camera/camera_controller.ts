@@ -120,13 +120,17 @@ export class CameraController {
   /** Back to the start. */
   reset(): void {
     if (this.scene_) this.load(this.scene_);
-    this.fov_y_rad = this.start?.fov_y_rad ?? default_fov_y_rad;
+    this.fov_y_rad = this.start_fov_y_rad;
+  }
+
+  /** The scene's own, whatever the visitor or a link has chosen. */
+  get start_fov_y_rad(): number {
+    return this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
   }
 
   /** Where reset() leads. */
   get start(): Eye | undefined {
-    const fov_y_rad = this.scene_?.start_fov_y_rad ?? default_fov_y_rad;
-    return this.scene_ && { ...this.scene_.start_pose, fov_y_rad };
+    return this.scene_ && { ...this.scene_.start_pose, fov_y_rad: this.start_fov_y_rad };
   }
 
   /** Sets another start for reset(). The camera stays where it is. */

@@ -192,7 +192,10 @@ export class Navigation {
     this.speed_chosen.emit(this.camera.speed);
   }
 
+  /** The visitor chooses the field of view. It ends a flight, which would choose it again. */
   set_fov(fov_y_rad: number): void {
+    this.taken_over.emit();
+    this.camera.stop_flight();
     this.camera.fov_y_rad = fov_y_rad;
     this.moved();
   }

@@ -17,6 +17,7 @@ export class QualityPanel {
   private readonly fov_value_ = by_id('view-fov-value', HTMLElement);
   private readonly speed_ = by_id('view-speed', HTMLInputElement);
   private readonly speed_value_ = by_id('view-speed-value', HTMLElement);
+  private shown_fov_y_deg_ = NaN;
   private readonly up_done_ = by_id('up-done', HTMLElement);
 
   constructor(
@@ -37,6 +38,8 @@ export class QualityPanel {
     this.fov_.addEventListener('input', () =>
       navigation_.set_fov(this.fov_.valueAsNumber / degrees),
     );
+    on_click('view-fov-own', () => navigation_.set_fov(navigation_.camera.start_fov_y_rad));
+    navigation_.sampled.listen(({ eye }) => this.show_fov(eye.fov_y_rad)); // flights change it, too
     this.speed_.addEventListener('input', () =>
       navigation_.set_speed(2 ** this.speed_.valueAsNumber),
     );
@@ -60,18 +63,30 @@ export class QualityPanel {
   }
 
   private show(): void {
-    const fov_y_deg = Math.round(this.navigation_.camera.fov_y_rad * degrees);
-    this.fov_.value = String(fov_y_deg);
-    this.fov_value_.textContent = number(fov_y_deg, {
-      style: 'unit',
-      unit: 'degree',
-      unitDisplay: 'narrow',
-    });
+    this.show_fov(this.navigation_.camera.fov_y_rad);
     const { speed } = this.navigation_.camera;
-    this.speed_.value = String(Math.log2(speed));
-    this.speed_value_.textContent = factor(speed);
+    show_value(this.speed_, Math.log2(speed), this.speed_value_, factor(speed));
     this.storage_.setItem(speed_key, String(speed));
   }
+
+  private show_fov(fov_y_rad: number): void {
+    const fov_y_deg = Math.round(fov_y_rad * degrees);
+    if (fov_y_deg === this.shown_fov_y_deg_) return;
+    this.shown_fov_y_deg_ = fov_y_deg;
+    const words = number(fov_y_deg, { style: 'unit', unit: 'degree', unitDisplay: 'narrow' });
+    show_value(this.fov_, fov_y_deg, this.fov_value_, words);
+  }
+}
+
+function show_value(
+  slider: HTMLInputElement,
+  value: number,
+  output: HTMLElement,
+  words: string,
+): void {
+  slider.value = String(value);
+  slider.setAttribute('aria-valuetext', words);
+  output.textContent = words;
 }
 
 const picture_size = (value: string): PictureSize =>

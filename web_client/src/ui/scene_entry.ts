@@ -132,11 +132,11 @@ export class SceneEntry {
 
   private read(document: TourDocument): ReturnType<typeof read_document> {
     const { navigation, view } = this.page_;
-    const { up, fov_y_rad } = navigation.camera;
+    const { up, start_fov_y_rad } = navigation.camera;
     return read_document(
       document,
       up,
-      fov_y_rad,
+      start_fov_y_rad,
       view.clientWidth / Math.max(1, view.clientHeight),
     );
   }

@@ -366,7 +366,7 @@ export class PlanPanel {
     const [east, north] = to_grid(this.map_, this.eye_.position);
     const [x, y] = px_of(view, east, north);
     const ahead = this.heading_rad() - view.up_rad - Math.PI / 2; // from the right, clockwise
-    const half = this.eye_.fov_y_rad / 2 + 0.15;
+    const half = Math.atan((Math.tan(this.eye_.fov_y_rad / 2) * innerWidth) / innerHeight);
     const light = context.createRadialGradient(x, y, 0, x, y, cone_px);
     light.addColorStop(0, 'rgb(31 111 235 / 60%)');
     light.addColorStop(1, 'rgb(31 111 235 / 0%)');
