@@ -268,6 +268,10 @@ std::unique_ptr<Encoder> make_x264_encoder(const EncoderSettings& settings) {
   context->thread_count = slices;
   context->thread_type = FF_THREAD_SLICE;  // frame threads would each hold back a frame
   context->qmin = sharp_quantiser;
+  // An encoder begins with a full VBV. One of a frame at the nominal rate is too small for a
+  // session that is slower: libx264 plans a first picture of its rate, and the later slice gets
+  // nothing.
+  context->rc_buffer_size = static_cast<int>(context->bit_rate);
   libav::Options options;
   options.set("preset", preset.base);
   options.set("x264-params", preset.parameters);
@@ -275,6 +279,7 @@ std::unique_ptr<Encoder> make_x264_encoder(const EncoderSettings& settings) {
   options.set("forced-idr", "1");      // a requested key frame is an IDR
   options.set("sc_threshold", "0");    // no I-frames at scene cuts: a teleport is coded as P
   libav::open(*context, codec, options);
+  apply_rate(*context, settings.bitrate_kbps, settings.fps, margins);
   return std::make_unique<LibavH264Encoder>(std::move(context), settings, level_idc, margins);
 }
 

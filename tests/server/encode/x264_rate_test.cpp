@@ -15,7 +15,7 @@ namespace catgs {
 namespace {
 
 constexpr glm::ivec2 size_px(1920, 1080);
-constexpr int kbps = 8000, fps = 60, still_fps = 13;
+constexpr int kbps = 8000, fps = 60, still_fps = 13, slow_fps = 20;
 constexpr int frames = 30, settled_after = 10;  // the first IDR is coarse
 constexpr double budget_bytes = kbps * 125.0 / fps;
 
@@ -31,6 +31,12 @@ class Coder {
     encoder_ = make_encoder(EncoderKind::x264, settings);
   }
 
+  /// The first picture of a session that is slower than its nominal rate.
+  void begins(const FrameView& picture) {
+    encoder_->set_rate(kbps, slow_fps);
+    db_.push_back(code(picture));
+    mean_use = static_cast<double>(frame_.bytes.size()) / (kbps * 125.0 / slow_fps);
+  }
   void moves(const FrameView& picture, bool counts) {
     const double db = code(picture);
     if (!counts) return;
@@ -82,7 +88,10 @@ class Coder {
 class X264Rate : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    for (const int threads : {1, 2, 4, 8}) coders.push_back(std::make_unique<Coder>(threads));
+    for (const int threads : {1, 2, 4, 8}) {
+      coders.push_back(std::make_unique<Coder>(threads));
+      slow_coders.push_back(std::make_unique<Coder>(threads));
+    }
     const auto pool = std::make_shared<ThreadPool>(2);
     const Scene city = synthesize(SynthKind::city, 300'000, 1, *pool);
     const auto view = make_cpu_renderer(city.cloud, pool, "auto")
@@ -95,12 +104,17 @@ class X264Rate : public testing::Test {
                                    size_px, 1100.0f, city.hints.near_z);
       ASSERT_TRUE(view->render(request, picture).ok());
       for (const auto& coder : coders) coder->moves(picture, i >= settled_after);
+      if (i > 0) continue;
+      for (const auto& coder : slow_coders) coder->begins(picture);
     }
     for (const auto& coder : coders) coder->rests(picture);
   }
-  static void TearDownTestSuite() { coders.clear(); }
+  static void TearDownTestSuite() {
+    coders.clear();
+    slow_coders.clear();
+  }
 
-  static inline std::vector<std::unique_ptr<Coder>> coders;
+  static inline std::vector<std::unique_ptr<Coder>> coders, slow_coders;
 };
 
 TEST_F(X264Rate, IsUsedWithAnyNumberOfThreads) {
@@ -108,6 +122,14 @@ TEST_F(X264Rate, IsUsedWithAnyNumberOfThreads) {
     EXPECT_GE(coder->mean_use, 0.84) << coder->threads() << " threads";
     EXPECT_LE(coder->most_use, 1.2) << coder->threads() << " threads";
     EXPECT_GE(coder->median_db(), coders[0]->median_db() - 0.5) << coder->threads() << " threads";
+  }
+}
+
+TEST_F(X264Rate, FirstPictureUsesTheRateOfASlowSession) {
+  for (const auto& coder : slow_coders) {
+    EXPECT_GE(coder->mean_use, 0.6) << coder->threads() << " threads";
+    EXPECT_LE(coder->mean_use, 1.2) << coder->threads() << " threads";
+    EXPECT_GE(coder->median_db(), slow_coders[0]->median_db() - 3.0) << coder->threads();
   }
 }
 
