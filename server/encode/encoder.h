@@ -24,7 +24,7 @@ inline constexpr int max_encoded_side_px = 8192;
 inline constexpr int max_encoded_fps = 240;
 inline constexpr int max_encoder_threads = 64;
 /// Slices share a picture's bits out before they are encoded, and a VBV of one frame has none to
-/// spare. Two use the rate as well as one does; four and eight leave 26 and 59 % of it unused
+/// spare. Two use nearly as much of the rate as one; four and eight leave 26 and 59 % of it unused
 /// (1920x1080, 8 Mbit/s).
 inline constexpr int max_h264_slices = 2;
 inline constexpr int min_bitrate_kbps = 100;

@@ -38,17 +38,19 @@ struct RateMargins {
 constexpr RateMargins one_slice{1.05, 1.0};
 constexpr RateMargins two_slices{1.07, 1.09};
 
-/// A VBV of one frame interval, so that no frame takes longer on a link of this bitrate. The
-/// encoder counts time at its nominal rate. A slower session gets a higher bitrate per nominal
+/// A VBV of about one frame interval, so that no frame takes much longer on a link of this bitrate.
+/// The encoder counts time at its nominal rate. A slower session gets a higher bitrate per nominal
 /// second, for the same bits per real second.
 void apply_rate(AVCodecContext& context, int bitrate_kbps, int fps, const RateMargins& margins) {
   // libavcodec hands whole kbit to x264, which takes a VBV of 0 for none. At low rates the bitrate
-  // grows with the rounded VBV.
+  // grows with the rounded VBV, within a bound: a link may carry no more.
+  constexpr double most_rounded = 1.2;
   const double frame_kbit = margins.rate * bitrate_kbps / fps;
   const double vbv_kbit = std::max(std::ceil(frame_kbit), std::floor(margins.vbv * frame_kbit));
-  const double nominal_kbps =
-      std::min(std::max(frame_kbit, vbv_kbit / margins.vbv) * context.framerate.num,
-               2e6);  // the most that x264 accepts
+  const double nominal_kbps = std::min(
+      std::max(frame_kbit, std::min(vbv_kbit / margins.vbv, most_rounded * bitrate_kbps / fps)) *
+          context.framerate.num,
+      2e6);  // the most that x264 accepts
   context.bit_rate = std::llround(nominal_kbps) * 1000;
   context.rc_max_rate = context.bit_rate;
   context.rc_buffer_size = static_cast<int>(vbv_kbit) * 1000;
@@ -189,11 +191,11 @@ class LibavH264Encoder final : public Encoder {
     return {};
   }
 
-  /// About the packet's picture, whose mean quantiser may be known.
+  /// Whether the packet's picture is sharp. Its mean quantiser may be known.
   [[nodiscard]] bool is_sharp(std::optional<double> quantiser) const {
     const double planned = reported_quantiser(*packet_);
     // libx264 may stay one above its plan. Less than a bit per macroblock codes nothing any more.
-    const int macroblocks = size_px_.x * size_px_.y / 256;
+    const int macroblocks = (size_px_.x + 15) / 16 * ((size_px_.y + 15) / 16);
     const bool finished = planned <= sharp_quantiser && 8 * packet_->size < macroblocks;
     return finished || quantiser.value_or(planned) <= sharp_mean;
   }

@@ -156,19 +156,26 @@ std::shared_ptr<const SceneEntry> load_scene(
   else
     log_info({.event = "scene_loading"}, "loading {} from its tree {}", spec,
              representation.tree.string());
-  LoadOptions options;
-  options.threads = threads;
-  options.up = axis_named(config.up);
-  options.progress = progress;
-  options.keep_view = keep.view;
+  const auto load_now = [&] {
+    LoadOptions options;
+    options.threads = threads;
+    options.up = axis_named(config.up);
+    options.progress = progress;
+    options.keep_view = keep.view;
+    return load(location, representation, config, std::move(options));
+  };
   const std::filesystem::path& sidecar = location.hints.sidecar;
-  const std::optional<std::string> before = sidecar_text(sidecar);
-  auto [tree, scene] = load(location, representation, config, std::move(options));
+  std::optional<std::string> text = sidecar_text(sidecar);
+  auto loaded = load_now();
   // Somebody may replace it during the load. Hints, tours and tag are those of one text.
-  const std::optional<std::string> text = sidecar_text(sidecar);
-  if (text != before)
-    use_sidecar(text ? sidecar_in(*text, sidecar, scene.hints.origin) : Sidecar(),
-                sidecar.filename().string(), scene.hints);
+  bool replaced = false;
+  if (std::optional<std::string> now = sidecar_text(sidecar); now != text) {
+    replaced = true;
+    text = std::move(now);
+    loaded = {};  // memory for one of them
+    loaded = load_now();
+  }
+  auto& [tree, scene] = loaded;
   auto entry = std::make_shared<SceneEntry>();
   entry->name = scene.name;
   entry->facts.scene_id = id_of(scene.name);
@@ -191,7 +198,7 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->renderer_text = fmt::format("{} ({})", made.renderer->description(), made.reason);
   entry->renderer = std::move(made.renderer);
   const auto draw = [&] { return make_poster(*entry->renderer, entry->facts); };
-  entry->poster = keep.poster && text == before ? keep.poster(draw) : draw();
+  entry->poster = keep.poster && !replaced ? keep.poster(draw) : draw();
   log_info({.event = "scene_loaded", .scene = entry->facts.scene_id},
            "scene {}: {} Gaussians, {}, {}{:.1f} MB per device, view from {}",
            entry->facts.scene_id, entry->facts.gaussians, scene.format,

@@ -381,8 +381,12 @@ asio::awaitable<void> Connection::refresh_display() {
   while (true) {
     const std::int64_t due_us = refresh_after(now_us() - behind_camera_us, hz);
     co_await wait_until(clock_time(due_us + behind_camera_us));
-    if (log.frames.empty() || log.full || !state_.last_pose || stalled()) continue;
+    if (log.frames.empty() || !state_.last_pose || stalled()) continue;
     const std::int64_t now = now_us();
+    if (log.full) {  // still shown, but not kept
+      if (undisplayed_) acknowledge(*std::exchange(undisplayed_, std::nullopt), now);
+      continue;
+    }
     const Pose camera = from_wire(state_.last_pose->world_from_camera());
     DisplayLog::Refresh refresh{.time_us = now,
                                 .frame = log.frames.size() - 1,

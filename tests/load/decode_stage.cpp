@@ -91,7 +91,6 @@ asio::awaitable<void> DecodeStage::run() {
 asio::awaitable<void> DecodeStage::decode(Item& item) {
   const std::int64_t begin_us = now_us();
   if (settings_.manners.decode) {
-    const bool first = !decoder_ || codec_ != item.header.codec();
     Decoded decoded = co_await decode_on_pool(item);
     const bool fits =
         decoded.picture.size_px == glm::ivec2(item.header.width_px(), item.header.height_px());
@@ -107,7 +106,7 @@ asio::awaitable<void> DecodeStage::decode(Item& item) {
       report_.stats.frame_decoded(decoded.duration_us);
       keep_still(item, decoded);
       keep_picture(item, decoded);
-      keep_frame(item, first);
+      keep_frame(item);
     }
   }
   if (settings_.manners.decode_time_s > 0.0)
@@ -120,6 +119,7 @@ asio::awaitable<DecodeStage::Decoded> DecodeStage::decode_on_pool(const Item& it
     decoder_ = std::make_unique<Decoder>(item.header.codec() == v1::CODEC_MJPEG ? Codec::mjpeg
                                                                                 : Codec::h264);
     codec_ = item.header.codec();
+    decoder_is_new_ = true;
   }
   // On the pool, so that decoding one session delays no other session's time stamps. The end of the
   // run does not cancel it: co_spawn would send the cancellation to the pool's thread, where the
@@ -146,7 +146,7 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
                               .picture = std::move(decoded.picture)});
 }
 
-void DecodeStage::keep_frame(Item& item, bool first) {
+void DecodeStage::keep_frame(Item& item) {
   if (!report_.display || report_.display->full) return;
   DisplayLog& log = *report_.display;
   log.full = log.bytes + item.bitstream.size() > max_display_log_bytes;
@@ -158,7 +158,7 @@ void DecodeStage::keep_frame(Item& item, bool first) {
                         .size_px = {item.header.width_px(), item.header.height_px()},
                         .pose_us = item.header.pose_client_time_us(),
                         .codec = *codec_ == v1::CODEC_MJPEG ? Codec::mjpeg : Codec::h264,
-                        .first = first,
+                        .first = std::exchange(decoder_is_new_, false),
                         .bitstream = std::move(item.bitstream)});
 }
 

@@ -60,7 +60,7 @@ class DecodeStage {
   [[nodiscard]] bool picture_is_due() const;
   void keep_picture(const Item& item, Decoded& decoded);
   /// For the display, and the check of it.
-  void keep_frame(Item& item, bool first);
+  void keep_frame(Item& item);
   /// The first ones of the first rests, until one is large and late enough to be sharp.
   void keep_still(const Item& item, const Decoded& decoded);
 
@@ -71,6 +71,7 @@ class DecodeStage {
   boost::asio::steady_timer filled_;  // cancelled when there is something to decode
   std::deque<Item> queue_;
   std::unique_ptr<Decoder> decoder_;
+  bool decoder_is_new_ = true;  // no frame of it was kept
   std::optional<v1::Codec> codec_;
   v1::SceneFacts scene_;
   bool wait_for_idr_ = true;

@@ -160,7 +160,7 @@ double largest_share(Encoder& encoder, int first_time, int frames, double budget
 
 // The VBV of one frame: no P-frame may take a link of that bitrate longer than its frame interval.
 TEST(X264Encoder, NoFrameOutgrowsItsShareOfTheBitrate) {
-  for (const int bitrate_kbps : {2000, 8000}) {
+  for (const int bitrate_kbps : {500, 2000, 8000}) {
     const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, bitrate_kbps, 60));
     const double budget_bytes = bitrate_kbps * 125.0 / 60;
     EXPECT_LE(largest_share(*encoder, 0, 60, budget_bytes), 1.1) << bitrate_kbps;

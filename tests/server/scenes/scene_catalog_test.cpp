@@ -91,12 +91,13 @@ TEST_F(SceneCatalog, ReadsATreeInPages) {
 
 TEST_F(SceneCatalog, SidecarThatIsReplacedDuringTheLoadCountsAsAWhole) {
   const std::string after = R"({"title": "After"})";
-  write("plain.json", R"({"title": "Before"})");
+  write("plain.json", R"({"title": "Before", "near": 0.5})");
   const auto entry = load(1, {}, {.view = [&](const auto& estimate) {
                             write("plain.json", after);
                             return estimate();
                           }});
   EXPECT_EQ(entry->facts.title, "After");
+  EXPECT_NE(entry->facts.near_z, 0.5f);
   EXPECT_EQ(entry->sidecar_tag, etag_of(after));
 }
 

@@ -223,7 +223,8 @@ export class AuthorPanel {
   /** The point in the middle of the view. Saves wait for the edit that asks for it. */
   private point_ahead(): ReturnType<Navigation['point_ahead']> {
     const point = this.tools_.navigation.point_ahead();
-    this.points_ = this.points_.then(() => point);
+    const known = point.catch(() => undefined);
+    this.points_ = this.points_.then(() => known);
     return point;
   }
 
