@@ -26,7 +26,7 @@ constexpr int sharp_quantiser = 16;
 constexpr double sharp_mean = sharp_quantiser + 0.25;  // a few blocks may be coarser
 constexpr double coarsest_quantiser = 51.0;
 
-/// What an encoder is asked for, so that its frames take the session's bits.
+/// An encoder is asked for this much, so that its frames take the session's bits.
 struct RateMargins {
   double rate = 1.0;  // in sessions' rates
   double vbv = 1.0;   // in frames of that rate

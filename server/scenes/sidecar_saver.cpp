@@ -32,6 +32,12 @@ std::shared_ptr<const SceneEntry> revised(const SceneEntry& entry, const Sidecar
   return scene;
 }
 
+/// The sidecar of an entry, with this content.
+Sidecar sidecar_of(const SceneEntry& entry, std::string_view text) {
+  return read_sidecar(MemorySource(entry.sidecar.string(), std::as_bytes(std::span(text))),
+                      entry.facts.origin);
+}
+
 HttpResponse tagged(int status, std::string text, std::string etag) {
   HttpResponse response = text_response(status, std::move(text));
   response.etag = std::move(etag);
@@ -92,8 +98,7 @@ SidecarSaver::Outcome SidecarSaver::refuse_outdated(const Request& request,
   try {
     if (tag != scene.sidecar_tag)
       refused.revised =
-          revised(scene, there ? sidecar_in(*there, scene.sidecar, scene.facts.origin) : Sidecar(),
-                  there, media_origins_);
+          revised(scene, there ? sidecar_of(scene, *there) : Sidecar(), there, media_origins_);
   } catch (const InputError& broken) {
     log_warning({.event = "sidecar_unreadable", .scene = request.scene_id},
                 "scene {}: stays as it was: {}", request.scene_id, broken.what());

@@ -102,9 +102,4 @@ std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar) {
   return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
-Sidecar sidecar_in(std::string_view text, const std::filesystem::path& sidecar,
-                   const glm::dvec3& origin) {
-  return read_sidecar(MemorySource(sidecar.string(), std::as_bytes(std::span(text))), origin);
-}
-
 }  // namespace catgs

@@ -44,9 +44,6 @@ struct ToursAnswers {
 /// The current content of the sidecar; nothing: no sidecar. Tag, hints and tours must come from the
 /// same text.
 std::optional<std::string> sidecar_text(const std::filesystem::path& sidecar);
-/// What this text of the sidecar says, about `origin`. Throws InputError.
-Sidecar sidecar_in(std::string_view text, const std::filesystem::path& sidecar,
-                   const glm::dvec3& origin);
 
 /// Checks a sidecar sent by an author. It is stricter than for operators' files: every field must
 /// be known, and check_page_fields() finds no mistake. Throws InputError that names the field. Its

@@ -24,16 +24,19 @@ std::vector<double> freezes_ms(const DisplayLog& log) {
   const DisplayLog::Refresh* changed = nullptr;  // where the frame on show came
   for (const DisplayLog::Refresh& refresh : log.refreshes) {
     const bool is_last = &refresh == &log.refreshes.back();
-    const bool moves = changed != nullptr && refresh.rest == 0;
-    if (moves && refresh.frame == changed->frame && !is_last) continue;
-    if (moves) {
+    // An interval ends with a new frame, with the log, or when the camera comes to rest.
+    const bool open = changed != nullptr && changed->rest == 0;
+    const bool rests = refresh.rest > 0;
+    const bool same = open && refresh.frame == changed->frame;
+    if (same && !rests && !is_last) continue;
+    if (open && (same || !rests)) {
       const double interval_ms = 1e-3 * static_cast<double>(refresh.time_us - changed->time_us);
       const std::size_t known = std::min(averaged, intervals_ms.size());
       const double sum = std::accumulate(intervals_ms.end() - static_cast<std::ptrdiff_t>(known),
                                          intervals_ms.end(), 0.0);
       const double mean = sum / static_cast<double>(std::max<std::size_t>(known, 1));
       if (interval_ms >= std::max(3.0 * mean, mean + 150.0)) freezes_ms.push_back(interval_ms);
-      intervals_ms.push_back(interval_ms);
+      if (!rests) intervals_ms.push_back(interval_ms);
     }
     changed = &refresh;
   }

@@ -10,7 +10,7 @@ namespace catgs::load {
 
 struct DisplayCheck {
   std::vector<std::string> scenes;  // as for ExactPictures
-  int every = 6;                    // refreshes; at rest each new frame is judged besides
+  int every = 7;                    // refreshes; at rest each new frame is judged besides
   /// For PNGs of the worst refreshes of each group, GROUP-N-shown.png and GROUP-N-exact.png; empty:
   /// none are written.
   std::filesystem::path worst_folder{};

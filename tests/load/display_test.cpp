@@ -1,4 +1,4 @@
-// What a client showed, made again after the run and judged by exact pictures.
+// Displays, made again after the run and judged by exact pictures.
 #include "tests/load/display.h"
 
 #include <numbers>
@@ -127,6 +127,9 @@ TEST(Display, FreezesAreLongIntervalsWhileTheCameraMoves) {
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(4, 40), {5}}))), ElementsAre(400.0));
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(4, 40)}))), ElementsAre(390.0))
       << "one without an end";
+  EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(4, 40), repeated(-4, 5)}))),
+              ElementsAre(400.0))
+      << "one until a rest";
   EXPECT_THAT(freezes_ms(shown(joined({{1, 2, 3}, repeated(-4, 40), {4, 5}}))), IsEmpty())
       << "a picture at rest stays";
 }

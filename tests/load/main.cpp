@@ -65,7 +65,7 @@ void add_options(CLI::App& app, ProgramOptions& options) {
   app.add_option("--check-scene", options.scenario.check.scenes,
                  "Compare pictures with this scene, rendered here: a file or synth:…; repeatable");
   app.add_option("--check-every", options.check_every,
-                 "With --glass: judge one of so many refreshes (default: 6), and each new frame "
+                 "With --glass: judge one of so many refreshes (default: 7), and each new frame "
                  "at rest")
       ->check(CLI::Range(1, 10'000));
   app.add_option("--worst", options.scenario.check.worst_folder,

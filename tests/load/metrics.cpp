@@ -136,7 +136,7 @@ double shown_sharp_after_ms(const SessionReport& session, int rest) {
   return after_ms;
 }
 
-/// What the visitors saw, with --glass.
+/// Metrics of what the visitors saw, with --glass.
 void add_displays(const SessionReports& sessions, Metrics& metrics) {
   std::vector<double> ssim, psnr_db, uncovered, ages_ms, freezes, sharp_ms;
   for (const auto& session : sessions) {

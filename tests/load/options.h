@@ -43,7 +43,7 @@ struct Manners {
 /// How the page's newest picture is warped to its newest camera.
 enum class WarpMode { automatic, turn, plane, off };
 
-/// What a client shows, and how, as the page does.
+/// How a client shows its frames: as the page does.
 struct DisplayOptions {
   bool judged = false;  // by exact pictures, after the run
   int hz = 60;

@@ -159,6 +159,11 @@ PaperTable display_table(const RunReport& report, const HoldBounds& bounds) {
   return table;
 }
 
+bool has_display(const GroupReport& group) {
+  return std::ranges::any_of(group.sessions,
+                             [](const auto& session) { return !session->judged.empty(); });
+}
+
 std::string to_table(const RunReport& report, const HoldBounds& bounds) {
   std::string text;
   if (const PaperTable displays = display_table(report, bounds); !displays.rows.empty()) {
@@ -167,9 +172,9 @@ std::string to_table(const RunReport& report, const HoldBounds& bounds) {
       for (const auto& [what, count] : all_errors(group.sessions))
         text += fmt::format("{}: {} x {}\n", group.name, count, what);
     }
-    return text;
   }
   for (const GroupReport& group : report.groups) {
+    if (has_display(group)) continue;  // it has a row above
     if (report.groups.size() > 1) text += fmt::format("\n-- {} --\n", group.name);
     append_table(group, bounds, text);
   }

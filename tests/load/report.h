@@ -15,7 +15,7 @@ const SessionReport* admitted(const SessionReports& sessions);
 nlohmann::ordered_json to_json(const RunReport& report, const Metrics& metrics,
                                const HoldBounds& bounds);
 
-/// What visitors saw: a row for each group that was judged, with --glass.
+/// The table of --glass: a row for each group that was judged.
 PaperTable display_table(const RunReport& report, const HoldBounds& bounds);
 
 /// For people: one screen for each group, or the table of displays.
