@@ -180,13 +180,17 @@ describe('an author', () => {
     await keep_screenshot(page, 'measures');
     expect(await barriers(page)).toEqual([]);
     await page.getByRole('button', { name: 'Make a tour' }).click();
-    await page.getByRole('button', { name: 'Save to the server' }).click();
+    // The save waits for the mark, which the server still looks for.
+    await page.evaluate(() => {
+      for (const id of ['measure-middle', 'author-save']) document.getElementById(id)!.click();
+    });
     await page.getByText('Saved. Visitors see it').waitFor();
     const saved = JSON.parse(readFileSync(sidecar, 'utf8')) as {
-      readonly measures: readonly { readonly title: string }[];
+      readonly measures: readonly { readonly title: string; readonly marks: readonly unknown[] }[];
       readonly tours: readonly { readonly stops: readonly { readonly fly_s?: number }[] }[];
     };
     expect(saved.measures).toMatchObject([{ title: 'The gate' }]);
+    expect(saved.measures[0]!.marks).toHaveLength(3);
     expect(saved.tours[0]!.stops.some(({ fly_s }) => fly_s === 3.2)).toBe(true);
     expect(errors).toEqual([]);
 

@@ -112,7 +112,8 @@ void Connection::say(const v1::ClientMessage& message) {
 }
 
 glm::dvec2 Connection::overscan() const {
-  return settings_.display.overscan.value_or(state_.overscan.sides());
+  return even_overscan(settings_.display.overscan.value_or(state_.overscan.sides()),
+                       settings_.size_px);
 }
 
 v1::Settings Connection::wanted_settings() const {

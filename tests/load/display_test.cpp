@@ -95,6 +95,21 @@ TEST(Overscan, IsThatOfTheSharedTurns) {
   EXPECT_EQ(changes, golden.at("overscans")) << changes;
 }
 
+TEST(Overscan, MakesEvenPicturesWhosePixelsARestSees) {
+  struct Case {
+    glm::dvec2 factors;
+    glm::ivec2 view_px;
+    glm::dvec2 picture_px;
+  };
+  for (const auto& [factors, view_px, picture_px] :
+       {Case{{1.26, 1.12}, {640, 360}, {806, 404}}, Case{{1.6, 1.26}, {1366, 768}, {2186, 968}},
+        Case{{1.0, 1.0}, {639, 361}, {639, 361}}}) {
+    const glm::dvec2 sides = even_overscan(factors, view_px);
+    EXPECT_EQ(sides * glm::dvec2(view_px), picture_px) << picture_px.x;
+    EXPECT_LT(glm::length(sides - factors), 4e-3) << picture_px.x;
+  }
+}
+
 /// A log of refreshes 10 ms apart: the frame of each one; negative at rest.
 DisplayLog shown(const std::vector<int>& frames) {
   DisplayLog log;
@@ -144,8 +159,8 @@ TEST(Display, ARestDoesNotAgeThePose) {
 class SmallCity : public ::testing::Test {
  protected:
   static constexpr const char* scene = "synth:city:20000";
-  static constexpr glm::dvec2 overscan{1.26, 1.12};
   static constexpr glm::ivec2 view_px{320, 180}, picture_px{404, 202};
+  static inline const glm::dvec2 overscan = even_overscan({1.26, 1.12}, view_px);
 
   static void SetUpTestSuite() {
     const Scene city = synthesize(SynthKind::city, 20'000, 1);

@@ -38,6 +38,13 @@ double angle_between(const glm::dquat& a, const glm::dquat& b) {
 
 }  // namespace
 
+glm::dvec2 even_overscan(const glm::dvec2& factors, glm::ivec2 view_px) {
+  const auto even = [](double factor, int px) {
+    return factor == 1.0 ? 1.0 : 2.0 * std::round(factor * px / 2.0) / px;
+  };
+  return {even(factors.x, view_px.x), even(factors.y, view_px.y)};
+}
+
 void TimeWindow::push(std::int64_t time_us, double value) {
   values_.emplace_back(time_us, value);
   while (values_.front().first < time_us - span_us_) values_.pop_front();

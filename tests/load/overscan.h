@@ -26,6 +26,10 @@ class TimeWindow {
   std::deque<std::pair<std::int64_t, double>> values_;
 };
 
+/// The factors nearest to these for which a picture of the view has even sides, as Display of the
+/// page chooses them: a camera at rest then sees its pixels.
+glm::dvec2 even_overscan(const glm::dvec2& factors, glm::ivec2 view_px);
+
 /// How much larger than the view the page wants its pictures: warp_policy.ts and turn_forecast.ts
 /// with "Smooth turning: automatic" on a display that is fast enough.
 /// tests/support/warp_golden.json holds both to the same choices.

@@ -5,6 +5,7 @@ import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
 import { warped, widened_fov } from '#client/present/warp';
+import { frame_sizes } from '#client/worker/frame_sizes';
 import golden from '../support/warp_golden.json';
 
 const at = (yaw: number): Eye => {
@@ -36,7 +37,7 @@ function make(can_warp: boolean): Display {
     on_refresh: (draw: () => void) => void refresh.push(draw),
     overscan_changed: () => undefined,
   };
-  return new Display(presenter(can_warp), environment, 16 / 9);
+  return new Display(presenter(can_warp), environment, { width_px: 1600, height_px: 900 });
 }
 
 function look(yaw: number): void {
@@ -88,10 +89,30 @@ describe('the display', () => {
     const { x, y } = display.overscan;
     expect(x).toBeGreaterThan(y);
     const wide = { ...at(0), fov_y_rad: widened_fov(1, y) };
-    await display.draw(picture, wide, 640 * x, 360 * y);
-    expect(drawn[0]).toMatchObject({ width_px: 640, height_px: 360 });
+    await display.draw(picture, wide, 1600 * x, 900 * y);
+    expect(drawn[0]).toMatchObject({ width_px: 1600, height_px: 900 });
     const { matrix } = drawn[0]!;
     expect(warped(matrix, 1, 1)).toEqual([expect.closeTo(1 / x, 5), expect.closeTo(1 / y, 5)]);
+  });
+
+  it.each([
+    [640, 360],
+    [1366, 768],
+    [1280, 718],
+    [412, 730],
+  ])('sees the pixels of pictures at rest in a view of %dx%d', async (width_px, height_px) => {
+    display.size = { width_px, height_px };
+    display.mode = 'on';
+    look(0);
+    const quality = { height_px: 0, still_height_px: 0, max_fps: 0 };
+    const sizes = frame_sizes(display.size, quality, display.overscan, Infinity);
+    const [wide_px, high_px] = [sizes.stillWidthPx!, sizes.stillHeightPx!];
+    const eye = { ...at(0), fov_y_rad: widened_fov(1, display.overscan.y) };
+    await display.draw(picture, eye, wide_px, high_px);
+    expect(drawn[0]).toMatchObject({ width_px, height_px });
+    const [x, y] = warped(drawn[0]!.matrix, 1 / width_px - 1, 1 / height_px - 1)!;
+    expect((x + 1) * wide_px).toBeCloseTo(wide_px - width_px + 1, 2);
+    expect((y + 1) * high_px).toBeCloseTo(high_px - height_px + 1, 2);
   });
 
   it('has asked for enough before a turn shows what is beside the picture', async () => {
@@ -104,7 +125,7 @@ describe('the display', () => {
       display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
       const picture_eye = at_time(s - lag_s);
       const eye = { ...picture_eye, fov_y_rad: widened_fov(1, display.overscan.y) };
-      await display.draw(picture, eye, 640 * display.overscan.x, 360 * display.overscan.y);
+      await display.draw(picture, eye, 1600 * display.overscan.x, 900 * display.overscan.y);
       // The policy looks at twelve pictures before it asks for anything.
       if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
     }
@@ -128,8 +149,8 @@ describe('the display', () => {
         display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
         const { x, y } = display.overscan;
         const eye = { ...at_time(s - turn.lag_s), fov_y_rad: widened_fov(1, y) };
-        await display.draw(picture, eye, 640 * x, 360 * y);
-        if (display.overscan === before) continue;
+        await display.draw(picture, eye, 1600 * x, 900 * y);
+        if (display.overscan.x === before.x && display.overscan.y === before.y) continue;
         before = display.overscan;
         changes.push({ refresh, ...before });
       }

@@ -1,7 +1,7 @@
 // Lengths, heights and areas, with their errors.
 import { describe, expect, it } from 'vitest';
-import { normalize, type Vec3 } from '#client/base/vector';
-import { visible_part } from '#client/camera/ray';
+import { add, normalize, rotate, scale, type Quat, type Vec3 } from '#client/base/vector';
+import { pixel_at, project, ray_through, visible_part } from '#client/camera/ray';
 import { area_of, length_of, rise_of, type Mark } from '#client/measure/measurement';
 import { bar_within, rough, usual_system, written, written_on_line } from '#client/measure/units';
 import { nothing_said, TourDraft } from '#client/tour/draft';
@@ -82,6 +82,22 @@ describe('measuring', () => {
       expect(within / tries).toBeGreaterThan(0.93);
       expect(within / tries).toBeLessThan(0.975);
     }
+  });
+});
+
+describe('a pixel at a point of the scene', () => {
+  const orientation: Quat = [0, 0.6, 0, 0.8];
+  it.each([
+    [0.4, 0.5, 0.5],
+    [1, 0.9, 0.2],
+    [2.2, 0.5, 0.5],
+    [2.2, 0.95, 0.9],
+  ])('has its size in a field of view of %d rad at %d, %d', (fov_y_rad, x, y) => {
+    const eye = { position: [1, 2, 3] as Vec3, orientation, fov_y_rad };
+    const { origin, direction } = ray_through(eye, x, y, 2);
+    const point = add(origin, scale(direction, 7));
+    const below = rotate(orientation, [0, pixel_at(point, eye, 500), 0]);
+    expect(project(add(point, below), eye, 2)![1]).toBeCloseTo(y + 1 / 500, 9);
   });
 });
 
@@ -280,6 +296,23 @@ describe('measures', () => {
     list.rename(0, 'not mine');
     list.remove_mark(0, 0);
     expect(list.all).toEqual([door]);
+  });
+
+  it('get the marks that were asked for in their order, before they are saved', async () => {
+    const list = new MeasureList();
+    const answers: ((mark: Mark) => void)[] = [];
+    const became = [true, true, false].map((counts) => {
+      const asked = new Promise<Mark>((answer) => answers.push(answer));
+      return list.add_found(asked, () => counts);
+    });
+    const saved = list.known.then(() => list.own);
+    answers[2]!(mark([3, 0, 0]));
+    answers[1]!(mark([2, 0, 0]));
+    answers[0]!(mark([1, 0, 0]));
+    expect(await Promise.all(became)).toEqual(['added', 'added', 'outdated']);
+    expect((await saved)[0]!.marks.map(({ point }) => point[0])).toEqual([1, 2]);
+    const nothing = list.add_found(Promise.resolve(undefined), () => true);
+    expect(await nothing).toBe('nothing');
   });
 
   it('of a link are added once, and not where the scene has them', () => {

@@ -201,9 +201,9 @@ export class AuthorPanel {
     by_id('author-film', HTMLDetailsElement).addEventListener('toggle', () => {
       this.open_film().catch((error: unknown) => console.warn('films cannot be ordered', error));
     });
-    on_click('author-save', () => void this.points_.then(() => this.save(this.made_from_)));
-    on_click('author-replace', () => void this.points_.then(() => this.save(this.theirs_)));
-    on_click('author-download', () => void this.points_.then(() => this.download()));
+    on_click('author-save', () => void this.known().then(() => this.save(this.made_from_)));
+    on_click('author-replace', () => void this.known().then(() => this.save(this.theirs_)));
+    on_click('author-download', () => void this.known().then(() => this.download()));
     window.addEventListener('beforeunload', (event) => {
       if (this.is_unsaved) event.preventDefault();
     });
@@ -218,6 +218,11 @@ export class AuthorPanel {
       tour: () => this.draft_.tour,
       token: () => this.token_,
     });
+  }
+
+  /** Resolves when all points that edits and measures have asked for are known. */
+  private known(): Promise<unknown> {
+    return Promise.all([this.points_, this.tools_.measures.known]);
   }
 
   /** The point in the middle of the view. Saves wait for the edit that asks for it. */

@@ -38,6 +38,13 @@ export function project(
   return [0.5 + x / z / tan / aspect / 2, 0.5 + y / z / tan / 2];
 }
 
+/** Side of a pixel at a point of the scene, where the view has so many rows. */
+export const pixel_at = (point: Vec3, eye: Eye, height_px: number): number =>
+  (2 *
+    Math.tan(eye.fov_y_rad / 2) *
+    dot(sub(point, eye.position), rotate(eye.orientation, forward))) /
+  Math.max(1, height_px);
+
 type ViewPoint = readonly [x: number, y: number];
 
 /** The part of the line between two points that is in the view, as in ray_through(); undefined: none is. */

@@ -9,7 +9,7 @@ import type { Flight } from '../camera/flight';
 import { Inertia } from '../camera/inertia';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import { is_held, sum_of, type Axes, type Gesture } from '../camera/movement';
-import { ray_through, surface_of, type Ray } from '../camera/ray';
+import { pixel_at, ray_through, surface_of, type Ray } from '../camera/ray';
 import type { Walker } from '../camera/walker';
 import { Gamepads, type GamepadAction } from '../input/gamepad';
 import { bind_view_input, type ScrollGate } from '../input/view_input';
@@ -245,15 +245,16 @@ export class Navigation {
 
   /** The point of the scene there, as a mark; undefined: nothing is there. `x`, `y`: as in Pointed. */
   async hit_at(x: number, y: number): Promise<Mark | undefined> {
+    const { eye } = this; // it may move until the answer comes
     const ray = this.ray_at(x, y);
     const hit = await this.picks_.hit(ray);
     if (!hit) return undefined;
-    const px_rad = this.eye.fov_y_rad / Math.max(1, this.view_.clientHeight);
+    const point = add(ray.origin, scale(ray.direction, hit.distance));
     return {
-      point: add(ray.origin, scale(ray.direction, hit.distance)),
+      point,
       direction: ray.direction,
       along: hit.spread,
-      across: pointing_px * px_rad * hit.distance,
+      across: pointing_px * pixel_at(point, eye, this.view_.clientHeight),
     };
   }
 

@@ -20,10 +20,13 @@ export interface ShownView extends Eye {
   readonly uncovered: number;
 }
 
-interface Shown {
-  readonly eye: Eye;
+interface Size {
   readonly width_px: number;
   readonly height_px: number;
+}
+
+interface Shown extends Size {
+  readonly eye: Eye;
 }
 
 const no_motion_rad = 1e-6;
@@ -37,11 +40,10 @@ export class Display {
   private view_: Eye | undefined;
   private redraw_due_ = false;
 
-  /** `aspect`: width over height of the view. */
   constructor(
     private readonly presenter_: Presenter,
     private readonly env_: DisplayEnvironment,
-    public aspect: number,
+    public size: Size,
   ) {
     this.policy_ = new WarpPolicy(presenter_.can_warp);
   }
@@ -66,9 +68,19 @@ export class Display {
     return this.policy_.state;
   }
 
-  /** Sides of the picture over those of the view. */
+  /**
+   * Sides of the picture over those of the view. Pictures have even sides. With the factor of the policy
+   * itself, a camera at rest would see between their pixels.
+   */
   get overscan(): Sides {
-    return this.policy_.overscan;
+    const { x, y } = this.policy_.overscan;
+    const even = (factor: number, px: number): number =>
+      factor === 1 ? 1 : (2 * Math.round((factor * px) / 2)) / px;
+    return { x: even(x, this.size.width_px), y: even(y, this.size.height_px) };
+  }
+
+  private get aspect(): number {
+    return this.size.width_px / this.size.height_px;
   }
 
   /** This page's newest camera. */
@@ -121,7 +133,7 @@ export class Display {
     // After a jump the view sees almost nothing of the picture, which is then better left as it is.
     const { x, y } = reach(matrix);
     if (Math.max(x, y) > farthest_reach) return undefined;
-    const height_px = Math.round(picture.height_px / this.policy_.overscan.y);
+    const height_px = Math.round(picture.height_px / this.overscan.y);
     return { matrix, width_px: Math.round(height_px * this.aspect), height_px };
   }
 

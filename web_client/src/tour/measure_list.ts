@@ -13,6 +13,7 @@ export class MeasureList {
   private chosen_: number | undefined; // index in `all`
   private language_ = '';
   private metres_per_unit_: number | undefined;
+  private known_: Promise<unknown> = Promise.resolve();
 
   /** Undefined: nobody has said it. */
   get metres_per_unit(): number | undefined {
@@ -45,6 +46,11 @@ export class MeasureList {
     return this.language_;
   }
 
+  /** Resolves when the marks that were asked for so far are known. */
+  get known(): Promise<unknown> {
+    return this.known_;
+  }
+
   edit_language(tag: string): void {
     if (tag === this.language_) return;
     this.language_ = tag;
@@ -74,6 +80,20 @@ export class MeasureList {
   /** The next mark begins another measure where none is chosen. */
   choose(index: number | undefined): void {
     if (index !== this.chosen_) this.set(this.own_, index);
+  }
+
+  /** Adds a mark when it is known, after those that were asked for before, if it still counts then. */
+  add_found(
+    asked: Promise<Mark | undefined>,
+    counts: () => boolean,
+  ): Promise<'added' | 'nothing' | 'full' | 'outdated'> {
+    const added = Promise.all([asked, this.known_]).then(([mark]) => {
+      if (!counts()) return 'outdated';
+      if (!mark) return 'nothing';
+      return this.add(mark) ? 'added' : 'full';
+    });
+    this.known_ = added;
+    return added;
   }
 
   /** Returns whether there is room for the mark. */

@@ -38,12 +38,10 @@ export class MeasurePanel {
   private readonly system_ = by_id('measure-system', HTMLSelectElement);
   private readonly known_ = by_id('measure-known', HTMLInputElement);
   private readonly lines_: MeasureLines;
-  private asked_: Promise<unknown> = Promise.resolve();
-  private begun_ = 0;
   private is_open_ = false;
 
   constructor(private readonly parts_: MeasureParts) {
-    const { navigation, toolbar, seen, measures, set_scale } = parts_;
+    const { toolbar, seen, measures, set_scale } = parts_;
     this.lines_ = new MeasureLines(
       {
         ...parts_,
@@ -68,7 +66,6 @@ export class MeasurePanel {
     toolbar.panel_shown.listen(({ panel, shown }) => {
       if (panel === 'measure') this.open(shown);
     });
-    navigation.entered.listen(() => this.forget_asked());
     seen.moved.listen((eye) => this.lines_.draw(eye));
     measures.changed.listen(() => this.show());
     this.open(!by_id('measure-panel', HTMLElement).hidden);
@@ -79,7 +76,6 @@ export class MeasurePanel {
     this.is_open_ = shown;
     if (shown) gestures.set('measure', this.take);
     else gestures.remove('measure');
-    this.forget_asked();
     this.show();
   }
 
@@ -105,21 +101,13 @@ export class MeasurePanel {
 
   /** `x`, `y`: shares of the view. */
   private async mark(x: number, y: number): Promise<void> {
-    const begun = this.begun_;
-    const asked = this.parts_.navigation.hit_at(x, y);
-    const earlier = this.asked_;
-    this.asked_ = asked;
-    await earlier; // marks come in the order of the clicks
-    const hit = await asked;
-    if (begun !== this.begun_) return;
-    if (!hit) this.say(text.measure.nothing_there);
-    else if (!this.parts_.measures.add(hit))
+    const { measures, navigation } = this.parts_;
+    const { scene_id } = navigation;
+    const is_here = (): boolean => navigation.scene_id === scene_id;
+    const what = await measures.add_found(navigation.hit_at(x, y), is_here);
+    if (what === 'nothing') this.say(text.measure.nothing_there);
+    else if (what === 'full')
       this.say(text.measure.too_many({ measures: max_measures, marks: max_marks }));
-  }
-
-  /** Marks that are still asked for do not count any more. */
-  private forget_asked(): void {
-    this.begun_ += 1;
   }
 
   private say(what: string): void {

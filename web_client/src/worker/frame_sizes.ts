@@ -4,7 +4,7 @@ import type { SettingsInit } from '../wire/wire';
 
 const wire_most_px = 8192;
 
-export const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
+const aspect_of = ({ width_px, height_px }: View): number => width_px / height_px;
 
 /**
  * Frame sizes: the chosen heights or those of the view, in the view's aspect, with overscan. No side is longer

@@ -23,7 +23,7 @@ import {
   type SettingsInit,
   type StreamConfig,
 } from '../wire/wire';
-import { aspect_of, frame_sizes } from './frame_sizes';
+import { frame_sizes } from './frame_sizes';
 import type { FromWorker, ToWorker } from './messages';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
@@ -90,7 +90,7 @@ class Client {
       on_refresh,
       overscan_changed: () => this.send_sizes(),
     };
-    this.display_ = new Display(this.presenter_, environment, aspect_of(start.view));
+    this.display_ = new Display(this.presenter_, environment, start.view);
     this.tell_presenter();
     this.pipeline_ = this.make_pipeline();
     this.session_ = this.make_session(start);
@@ -184,7 +184,7 @@ class Client {
 
   private resize({ view, quality }: Extract<ToWorker, { kind: 'view' }>): void {
     this.view_ = view;
-    this.display_.aspect = aspect_of(view);
+    this.display_.size = view;
     this.quality_ = quality;
     this.send_sizes();
   }
