@@ -35,22 +35,25 @@ struct RateMargins {
 // slices may wait for a processor, and they misjudge each other's size. In a full VBV the later one
 // then ended in blocks of the coarsest quantiser, in a frame of 1,400 on a busy machine. From 1.1
 // frames on, libx264 controls its rate in another way and uses 60 %.
+constexpr double longest_vbv = 1.09;
 constexpr RateMargins one_slice{1.05, 1.0};
-constexpr RateMargins two_slices{1.07, 1.09};
+constexpr RateMargins two_slices{1.07, longest_vbv};
 
 /// A VBV of about one frame interval, so that no frame takes much longer on a link of this bitrate.
 /// The encoder counts time at its nominal rate. A slower session gets a higher bitrate per nominal
 /// second, for the same bits per real second.
 void apply_rate(AVCodecContext& context, int bitrate_kbps, int fps, const RateMargins& margins) {
   // libavcodec hands whole kbit to x264, which takes a VBV of 0 for none. At low rates the bitrate
-  // grows with the rounded VBV, within a bound: a link may carry no more.
+  // grows with the rounded VBV, within a bound: a link may carry no more. A VBV that would then be
+  // too long for the rate is rounded down, and the rate with it.
   constexpr double most_rounded = 1.2;
   const double frame_kbit = margins.rate * bitrate_kbps / fps;
-  const double vbv_kbit = std::max(std::ceil(frame_kbit), std::floor(margins.vbv * frame_kbit));
-  const double nominal_kbps = std::min(
-      std::max(frame_kbit, std::min(vbv_kbit / margins.vbv, most_rounded * bitrate_kbps / fps)) *
-          context.framerate.num,
-      2e6);  // the most that x264 accepts
+  const double most_kbit = most_rounded * bitrate_kbps / fps;
+  double vbv_kbit = std::max(std::ceil(frame_kbit), std::floor(margins.vbv * frame_kbit));
+  if (vbv_kbit > longest_vbv * most_kbit) vbv_kbit = std::max(1.0, std::floor(frame_kbit));
+  const double rounded_kbit = std::max(frame_kbit, std::min(vbv_kbit / margins.vbv, most_kbit));
+  const double nominal_kbps = std::min(std::min(rounded_kbit, vbv_kbit) * context.framerate.num,
+                                       2e6);  // the most that x264 accepts
   context.bit_rate = std::llround(nominal_kbps) * 1000;
   context.rc_max_rate = context.bit_rate;
   context.rc_buffer_size = static_cast<int>(vbv_kbit) * 1000;

@@ -160,9 +160,12 @@ HttpResponse SidecarSaver::apply(const Request& request, const Outcome& outcome)
   if (!outcome.revised) return outcome.answer;
   const std::string& id = request.scene_id;
   const bool same = same_poster(outcome.revised->facts, request.entry->facts);
-  if ((!outcome.revised->poster || !same) && posters_due_.insert(id).second)
-    jobs_.start(lanes.sidecars, Priority::normal,
-                [this, id](const std::stop_token& stop) { render_poster(id, stop); });
+  if ((!outcome.revised->poster || !same) && posters_due_.insert(id).second) {
+    const auto job =
+        jobs_.start(lanes.sidecars, Priority::normal,
+                    [this, id](const std::stop_token& stop) { render_poster(id, stop); });
+    if (job == 0) posters_due_.erase(id);  // the lane is full: the next save renders it
+  }
   scenes_.revise(id, outcome.revised);
   return outcome.answer;
 }

@@ -149,9 +149,8 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
 void DecodeStage::keep_frame(Item& item) {
   if (!report_.display || report_.display->full) return;
   DisplayLog& log = *report_.display;
-  log.full = log.bytes + item.bitstream.size() > max_display_log_bytes;
-  if (log.full) return report_.stats.error("the run is too long: no further frame is judged");
-  log.bytes += item.bitstream.size();
+  if (!log.take_room(item.bitstream.size()))
+    return report_.stats.error("the run is too long: no further frame is judged");
   log.near_z = scene_.near_z();
   log.scene_id = scene_.scene_id();
   log.frames.push_back({.eye = {from_wire(item.header.render_pose()), item.header.fov_y_rad()},

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,12 +39,19 @@ struct DisplayLog {
   std::string scene_id;
   std::vector<Frame> frames;
   std::vector<Refresh> refreshes;  // in time order, from the first frame on
-  std::size_t bytes = 0;           // of the frames
-  bool full = false;               // nothing more is kept
+  std::shared_ptr<std::size_t> room_bytes;  // for frames of all logs of the run
+  bool full = false;                        // nothing more is kept
+
+  /// False: the room is used up.
+  [[nodiscard]] bool take_room(std::size_t bytes) {
+    full = full || bytes > *room_bytes;
+    if (!full) *room_bytes -= bytes;
+    return !full;
+  }
 };
 
 /// Frames of a longer run would not fit into memory.
-inline constexpr std::size_t max_display_log_bytes = std::size_t{1} << 30;
+inline constexpr std::size_t max_display_bytes = std::size_t{1} << 30;
 
 /// Age of the pose behind the frame on show at each refresh; NaN at rest. A rest does not count
 /// afterwards either: the camera was still there.

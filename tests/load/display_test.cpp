@@ -149,6 +149,16 @@ TEST(Display, FreezesAreLongIntervalsWhileTheCameraMoves) {
       << "a picture at rest stays";
 }
 
+TEST(Display, LogsOfARunShareItsRoom) {
+  DisplayLog a, b;
+  a.room_bytes = b.room_bytes = std::make_shared<std::size_t>(100);
+  EXPECT_TRUE(a.take_room(60));
+  EXPECT_FALSE(b.take_room(60));
+  EXPECT_FALSE(b.take_room(1)) << "the frames after a lost one cannot be decoded";
+  EXPECT_TRUE(a.take_room(40));
+  EXPECT_FALSE(a.take_room(1));
+}
+
 TEST(Display, ARestDoesNotAgeThePose) {
   EXPECT_THAT(pose_ages_ms(shown({0, 1, 1, 2})), ElementsAre(10.0, 10.0, 20.0, 20.0));
   EXPECT_THAT(pose_ages_ms(shown({0, -1, -1, -1, 1, 1})),

@@ -186,6 +186,7 @@ class Run {
     settings.manners.decode = group.manners.decode || group.display.judged;
     if (group.display.judged) {
       report.display.emplace();
+      report.display->room_bytes = display_room_bytes_;
       report.display->view_px = settings.size_px;
       report.display->fov_y_rad = glm::radians(group.wishes.fov_y_deg);
     }
@@ -227,6 +228,8 @@ class Run {
   int sessions_ = 0;
   int running_ = 0;
   std::int64_t begin_us_ = 0;
+  const std::shared_ptr<std::size_t> display_room_bytes_ =
+      std::make_shared<std::size_t>(max_display_bytes);
   RunReport report_;
   std::exception_ptr failure_;
 };

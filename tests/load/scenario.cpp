@@ -1,5 +1,6 @@
 #include "tests/load/scenario.h"
 
+#include <algorithm>
 #include <csignal>
 #include <map>
 #include <set>
@@ -106,6 +107,9 @@ std::vector<MatrixEntry> entries_of(const std::string& path, const toml::table& 
   for (const toml::table* table : tables_of(path, matrix, axis)) {
     const auto name = (*table)["name"].value<std::string>();
     if (!name) throw mistake(path, *table, fmt::format("a {} of a matrix needs a name", axis));
+    if (std::ranges::count(entries, *name, &MatrixEntry::name) > 0)
+      throw mistake(path, *table, fmt::format("matrix.{}: two are called \"{}\"", axis, *name),
+                    "give each a name of its own");
     entries.push_back({table, *name});
   }
   if (entries.empty())
@@ -123,7 +127,12 @@ void read_matrix(const std::filesystem::path& path, const toml::table& matrix,
   add_duration(options, "--row", row_s);
   read_values(name, matrix, options, {"trace", "link"});
   if (scenario.check.scenes.empty()) throw mistake(name, matrix, "a matrix needs check-scene");
+  std::set<std::string> scene_names;
   for (const std::string& scene : scenario.check.scenes) {
+    if (!scene_names.insert(scene_name(scene)).second)
+      throw mistake(name, matrix,
+                    fmt::format("check-scene: two are called \"{}\"", scene_name(scene)),
+                    "rename a file");
     scenario.server_args.insert(scenario.server_args.end(), {"--scene", scene});
     for (const MatrixEntry& trace : entries_of(name, matrix, "trace")) {
       for (const MatrixEntry& link : entries_of(name, matrix, "link")) {

@@ -132,6 +132,14 @@ sizes = ["160x90"]
                  "a matrix needs a [[matrix.link]]");
   expect_refused("check-scene = \"synth:city:1\"\n[[matrix.trace]]\n[[clients]]\n",
                  "line 2: a trace of a matrix needs a name");
+  expect_refused(
+      "check-scene = [\"synth:city:1\", \"synth:city:2\"]\n[matrix]\n[[matrix.trace]]\n"
+      "name = \"a\"\n[[matrix.link]]\nname = \"b\"\n[[clients]]\n",
+      "line 2: check-scene: two are called \"city\"");
+  expect_refused(
+      "check-scene = \"synth:city:1\"\n[[matrix.trace]]\nname = \"a\"\n[[matrix.trace]]\n"
+      "name = \"a\"\n[[clients]]\n",
+      "line 4: matrix.trace: two are called \"a\"");
 }
 
 TEST_F(ScenarioFile, OverscanIsTwoFactors) {

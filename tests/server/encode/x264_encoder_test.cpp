@@ -167,6 +167,23 @@ TEST(X264Encoder, NoFrameOutgrowsItsShareOfTheBitrate) {
   }
 }
 
+// libx264 takes whole kbit, of which a frame has few then.
+TEST(X264Encoder, LowRatesAreUsedAndKept) {
+  constexpr std::pair<int, int> cases[] = {{100, 10}, {100, 60}, {130, 60},
+                                           {170, 30}, {250, 60}, {400, 15}};
+  for (const auto& [bitrate_kbps, fps] : cases) {
+    for (const int threads : {1, 2}) {
+      EncoderSettings settings = settings_of({640, 360}, bitrate_kbps, 60);
+      settings.threads = threads;
+      const auto encoder = make_encoder(EncoderKind::x264, settings);
+      encoder->set_rate(bitrate_kbps, fps);
+      const double share = largest_share(*encoder, 0, 30, bitrate_kbps * 125.0 / fps);
+      EXPECT_GE(share, 0.7) << bitrate_kbps << " kbit/s at " << fps << ", " << threads;
+      EXPECT_LE(share, 1.2) << bitrate_kbps << " kbit/s at " << fps << ", " << threads;
+    }
+  }
+}
+
 TEST(X264Encoder, IdrsFitTheirShareToo) {
   const auto encoder = make_encoder(EncoderKind::x264, settings_of({640, 360}, 8000, 60));
   EncodedFrame out;

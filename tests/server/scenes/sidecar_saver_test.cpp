@@ -120,6 +120,24 @@ TEST_F(SidecarSaverTest, SavesThatWaitTogetherGetOnePoster) {
   EXPECT_EQ(posters_.size(), 2u) << "the one before, and one";
 }
 
+TEST_F(SidecarSaverTest, APosterThatFoundNoRoomComesWithTheNextSave) {
+  std::promise<void> go_on;
+  const auto waits = go_on.get_future().share();
+  Background::Jobs others(background_);
+  Saved first = save(sidecar_at(1));
+  // It has asked the session thread, which does not answer until the lane is full.
+  for (std::size_t i = 0; i <= Background::most_waiting; ++i)
+    others.start(lanes.sidecars, Priority::normal, [waits](const auto&) { waits.wait(); });
+  run_until([&] { return is_ready(first); });
+  EXPECT_EQ(first.get().status, 200);
+  go_on.set_value();
+  run_all();
+  EXPECT_EQ(entry()->poster, scene_->poster);
+  Saved second = save(sidecar_at(2));
+  run_until([&] { return entry()->poster != scene_->poster; });
+  EXPECT_EQ(second.get().status, 200);
+}
+
 TEST_F(SidecarSaverTest, ToursAloneNeedNoPoster) {
   Saved tours = save(R"({"tours": [{"title": "Hall", "stops": []}]})");
   run_until([&] { return is_ready(tours); });
