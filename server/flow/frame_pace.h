@@ -31,8 +31,8 @@ class FramePace {
     if (!due_since_ && (!next_start_ || now >= *next_start_ - half_pose_interval_))
       due_since_ = now;
   }
-  /// An acknowledgement returned the credit that was missing.
-  void credit_returned(TimePoint now) { credit_since_ = now; }
+  /// The link, and not the renderer, keeps a frame from starting.
+  void held_back(TimePoint now) { held_back_ = now; }
 
   /// A frame starts. The nominal `interval` is kept on average, but lost time is not caught up.
   void frame_starts(std::chrono::microseconds interval, TimePoint now) {
@@ -67,8 +67,8 @@ class FramePace {
     constexpr std::chrono::milliseconds longest_interval{500};
     Seconds interval = last_start_ ? now - *last_start_ : longest_interval;
     last_start_ = now;
-    // The frame waited for credit. Larger frames would make it wait longer.
-    if (credit_since_ > next_start_) interval = nominal;
+    // The frame waited for the link. Larger frames would make it wait longer.
+    if (held_back_ > next_start_) interval = nominal;
     if (interval >= longest_interval) return;
     mean_interval_ += (interval - mean_interval_) / 8.0;
     measured_ = true;
@@ -79,7 +79,7 @@ class FramePace {
   std::optional<TimePoint> newest_pose_;
   std::optional<TimePoint> due_since_;
   Duration half_pose_interval_{};  // the mean over about eight of them
-  std::optional<TimePoint> credit_since_;
+  std::optional<TimePoint> held_back_;
   Seconds mean_interval_{0.05};
   bool measured_ = false;
 };

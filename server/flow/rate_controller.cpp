@@ -53,6 +53,7 @@ void RateController::add(const Sample& sample, TimePoint now) {
   }
   const std::int64_t queue_us = queue_of(sample, now);
   remember(sample, queue_us, now);
+  if (sample.delays_us[0] && has_sped_up(*sample.delays_us[0], now)) capacity_.reset();
   if (queue_ <= target_) back_offs_in_a_row_ = 0;
   if (!hold_until_ || now >= *hold_until_) {
     if (queue_ > target_)
@@ -67,6 +68,7 @@ void RateController::forget_path() {
   for (RunningMinimum& base : base_) base.reset();
   recent_.clear();
   capacity_.reset();
+  least_delay_us_ = {};
   queue_ = {};
   last_add_.reset();
   hold_until_.reset();
@@ -142,6 +144,18 @@ void RateController::back_off(const Sample& sample, TimePoint now) {
   const std::chrono::duration<double> hardly = hardly_shorter * queue_at_first_;
   if (queue_ < hardly) return;
   for (RunningMinimum& base : base_) base.reset();
+}
+
+bool RateController::has_sped_up(std::int64_t delay_us, TimePoint now) {
+  if (!within(second_begun_, 1s, now)) {
+    second_begun_ = now;
+    least_delay_us_ = {std::nullopt, least_delay_us_[0]};
+  }
+  auto& [newest, before] = least_delay_us_;
+  const bool faster =
+      before && delay_us < std::min(newest.value_or(*before), *before) - target_.count() / 3;
+  newest = std::min(delay_us, newest.value_or(delay_us));
+  return faster;
 }
 
 void RateController::grow(TimePoint now) {

@@ -27,6 +27,9 @@ namespace catgs {
 /// - After a second without samples, the capacity may have changed unseen. If the path has carried
 ///   more than the present rate, the rate then grows very fast, up to what it has carried, until
 ///   something queues. An attempt that fails makes the next one shorter.
+/// - When delays become shorter than in the last second and no back-off explains it, the capacity
+/// has
+///   grown: it is unknown again.
 /// - A stall, such as TCP's after a burst of losses, does not lower the capacity. A gap longer than
 ///   all others together is left out of the delivered rate.
 /// - After five back-offs in a row without a shorter queue, the path has become longer or is filled
@@ -81,6 +84,8 @@ class RateController {
   void remember(const Sample& sample, std::int64_t queue_us, TimePoint now);
   void back_off(const Sample& sample, TimePoint now);
   void grow(TimePoint now);
+  /// Whether the delay on the way has fallen under its least of the last one to two seconds.
+  bool has_sped_up(std::int64_t delay_us, TimePoint now);
   void clamp_rate();
 
   Limits limits_;
@@ -89,6 +94,8 @@ class RateController {
   std::array<RunningMinimum, 2> base_;
   std::deque<Passed> recent_;
   std::chrono::microseconds queue_{0};
+  std::array<std::optional<std::int64_t>, 2> least_delay_us_{};  // of this second and the last one
+  std::optional<TimePoint> second_begun_;
   std::optional<double> capacity_;  // delivered rate when the stage was last busy
   double passed_when_busy_ = 0.0;   // the same, kept however far the rate has grown since
   double carried_ = 0.0;  // the most that was delivered without a queue; less after attempts failed

@@ -53,6 +53,7 @@ bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
     return false;
   }
   pose_received_ = now;
+  if (!flow_.may_send()) pace_.held_back(now);
   pace_.pose_arrived(flow_.frame_interval(), now);
   const bool moved = !before || !same_view(*before, sample, near_z_);
   if (moved) rest_.moved(now);
@@ -67,10 +68,8 @@ void FrameLoop::go_on_from(const Hello& hello, TimePoint now) {
 }
 
 bool FrameLoop::acknowledged(const Ack& ack, TimePoint now) {
-  const bool held_back = !flow_.may_send();
-  if (!flow_.acknowledged(ack, now)) return false;
-  if (held_back && flow_.may_send()) pace_.credit_returned(now);
-  return true;
+  if (!flow_.may_send()) pace_.held_back(now);
+  return flow_.acknowledged(ack, now);
 }
 
 bool FrameLoop::shows(const PoseSample& pose) const {

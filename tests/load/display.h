@@ -38,7 +38,7 @@ struct DisplayLog {
   float near_z = 0.0f;
   std::string scene_id;
   std::vector<Frame> frames;
-  std::vector<Refresh> refreshes;  // in time order, from the first frame on
+  std::vector<Refresh> refreshes;           // in time order, from the first frame on
   std::shared_ptr<std::size_t> room_bytes;  // for frames of all logs of the run
   bool full = false;                        // nothing more is kept
 

@@ -95,6 +95,13 @@ class FlowSimulation {
       if (p.at >= from && p.at < to) oldest = std::max(oldest, p.pose_age);
     return oldest;
   }
+  /// The longest time without a new picture.
+  [[nodiscard]] microseconds longest_freeze(microseconds from, microseconds to) const {
+    microseconds longest{0}, shown = from;
+    for (const Presented& p : presented_)
+      if (p.at >= from && p.at < to) longest = std::max(longest, p.at - std::exchange(shown, p.at));
+    return std::max(longest, to - shown);
+  }
   /// Of the frames sent in a time.
   [[nodiscard]] std::vector<FrameTrace> sent(microseconds from, microseconds to) const {
     std::vector<FrameTrace> some;

@@ -72,6 +72,22 @@ TEST_P(OnEveryPath, ALinkThatStaysSlowDuringRestsIsNotFilledByTrying) {
   EXPECT_EQ(simulation.sizes(), 1);
 }
 
+TEST_P(OnEveryPath, ALinkThatFallsToATenthFreezesNothingAndIsUsedSoonAfterItIsBack) {
+  for (const std::size_t queue_bytes : {31'250u, 1u << 20}) {
+    FlowScenario falls = scenario({{0us, 5e6}, {5s, 0.5e6}, {10s, 5e6}});
+    falls.link.queue_bytes = queue_bytes;
+    falls.max_bitrate_kbps = 8'000;
+    FlowSimulation simulation(falls);
+    simulation.run(20s);
+    EXPECT_LT(simulation.longest_freeze(4s, 20s), 300ms) << queue_bytes;
+    const bool jitters = GetParam().jitter > 0us;  // that hides what the link carries
+    const microseconds back = jitters ? 14s : 12s;
+    EXPECT_GE(simulation.sent_kbps(back, back + 500ms),
+              (jitters ? 0.75 : 0.9) * simulation.sent_kbps(3s, 5s))
+        << queue_bytes;
+  }
+}
+
 TEST_P(OnEveryPath, KeepsItsNominalRateWhereTheLinkIsEnough) {
   FlowSimulation simulation(scenario({{0us, 50e6}}));
   simulation.run(10s);
