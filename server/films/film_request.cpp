@@ -48,7 +48,7 @@ glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
 
 FilmView read_view(const JsonField& field, const FilmView* before) {
   const std::size_t count = field.value().is_array() ? field.size() : 0;
-  if (count != 8 && !(count == 7 && before))
+  if (count != 8 && count != 9 && !(count == 7 && before))
     field.fail("is not [x, y, z, qx, qy, qz, qw, fov_deg]",
                "give fov_deg in the first view; later ones may leave it out, and a whole number "
                "repeats the view before");
@@ -59,10 +59,14 @@ FilmView read_view(const JsonField& field, const FilmView* before) {
   view.orientation = glm::quat(field.as_orientation({number(6), number(3), number(4), number(5)}));
   if (count == 7) {
     view.fov_y_rad = before->fov_y_rad;
+    view.view_height = before->view_height;
   } else {
     if (!(number(7) >= 5.0 && number(7) <= 160.0))
       field.fail("has a field of view that is not between 5 and 160 degrees");
     view.fov_y_rad = glm::radians(field[7].number());
+    if (count == 9) view.view_height = field[8].number();
+    if (count == 9 && !(view.view_height >= 1e-6f && view.view_height <= max_coordinate))
+      field.fail("has a view whose height is not a positive number of world units");
   }
   return view;
 }

@@ -65,8 +65,8 @@ class Progress {
 
 FrameRequest request_of(const SceneEntry& scene, const FilmView& view, glm::ivec2 size_px) {
   FrameRequest request;
-  request.camera = make_camera(view.pose_about(scene.facts.origin), size_px,
-                               focal_from_fov_y(view.fov_y_rad, size_px.y), scene.facts.near_z);
+  request.camera = make_view_camera(view.pose_about(scene.facts.origin), size_px, view.fov_y_rad,
+                                    view.view_height, scene.facts.near_z);
   request.background = colour_of(scene.facts.about.background_rgb);
   request.waits_for_pages = true;
   return request;
