@@ -133,15 +133,16 @@ export class FilmPanel {
     if (!eyes) return;
     const file = `${file_name_of(this.tools_.navigation.scene_id)}.tum`;
     save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
-    const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
+    const { fov_y_rad, view_height } = eyes[0] ?? { fov_y_rad: 1 };
     const command = [
       'catgs-render',
       'frames',
       '…',
       '--trace',
       file,
-      '--fov-deg',
-      fov_deg.toFixed(1),
+      ...(view_height
+        ? ['--orthographic', view_height.toPrecision(6)]
+        : ['--fov-deg', ((fov_y_rad * 180) / Math.PI).toFixed(1)]),
       '--out',
       'film.mp4',
     ];
