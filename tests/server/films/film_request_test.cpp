@@ -36,6 +36,19 @@ TEST(FilmRequest, OrthographicViewsHaveANinthNumber) {
   EXPECT_EQ(views[2].view_height, 0.0f);
 }
 
+TEST(FilmRequest, MayDrawOneBoxOnly) {
+  const auto boxed = [](const std::string& box) {
+    return fmt::format(R"({{"kind": "picture", "size": [320, 180], "views": [{}], "box": {}}})",
+                       view, box);
+  };
+  const auto box = parse_film_request(boxed("[1, 2, 3, 0, 0, 0, 1, 4, 5, 6]")).box;
+  ASSERT_TRUE(box);
+  EXPECT_EQ(box->centre, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(box->half_extent, glm::vec3(4, 5, 6));
+  for (const char* bad : {"[1, 2, 3]", "7", "[1, 2, 3, 0, 0, 0, 1, 4, 0, 6]"})
+    EXPECT_EQ(mistake(boxed(bad)), "box") << bad;
+}
+
 TEST(FilmRequest, LastsTenMinutesAtMost) {
   EXPECT_EQ(parse_film_request(film(view + ", 17999")).views.size(), most_film_frames);
   for (const char* frames : {", 18000", ", 4294967295"})

@@ -214,6 +214,7 @@ export class AuthorPanel {
     if (this.film_) return this.film_.look();
     this.film_ = new FilmPanel(fields, {
       navigation: this.tools_.navigation,
+      clipping: this.tools_.clipping,
       tour: () => this.draft_.tour,
       token: () => this.token_,
     });
