@@ -195,7 +195,7 @@ ClusterColours CpuView::colours_of(std::size_t rank, const Camera& camera) {
   const std::uint32_t cluster = clusters_[rank];
   const std::uint64_t page = paged_ ? paged_->table().shape().page_of(nodes_[rank]) : 0;
   return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster],
-                              camera.world_from_camera.position);
+                              colour_eye(camera));
 }
 
 /// Projects the visible clusters in `shares` and calls done(share, rank) after each.

@@ -127,7 +127,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
 
     look.centre_px = s.shape.centre_px;
     look.w = whitening(s.shape);
-    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
+    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.eye);
     look.depth = depth;
     look.scene_order = load_index(scene, i);
     box.rightmost_y = rightmost_y(look.w, reach);
@@ -177,7 +177,7 @@ inline ClusterSummary refresh_cluster(const RefreshTask& task) {
     look.centre_px = shape.centre_px;
     look.w = whitening(shape);
     look.log2_opacity = look_of(scene, load_log2_opacity(scene, i, task.share), shape);
-    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.position);
+    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.eye);
     look.scene_order = load_index(scene, i);
     extremes.add_depths(mask_of_bits<hn::ScalableTag<float>>(hits) & in_front &
                             (look.depth > Floats(task.min_depth)),

@@ -85,10 +85,9 @@ HWY_INLINE Floats load_index(const SceneStore& scene, std::size_t i) {
 /// Colour of the Gaussians from `i` on, which share a packet.
 template <int degree>
 HWY_INLINE Vec3<Floats> shade_of_degree(const SceneStore& scene, std::size_t i,
-                                        const Vec3<Floats>& mean,
-                                        const Vec3<Floats>& camera_position) {
+                                        const Vec3<Floats>& mean, const Vec3<Floats>& eye) {
   Floats basis[16];
-  sh_basis(view_direction(camera_position, mean), degree, basis);
+  sh_basis(view_direction(eye, mean), degree, basis);
   const float* sh = scene.sh_of_packet(i / packet_size) + i % packet_size;
   Vec3<Floats> sum{Floats(0.0), Floats(0.0), Floats(0.0)};
   for (int k = 0; k < sh_coefficient_count(degree); ++k, sh += 3 * packet_size) {
@@ -100,16 +99,16 @@ HWY_INLINE Vec3<Floats> shade_of_degree(const SceneStore& scene, std::size_t i,
 }
 
 inline Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Floats>& mean,
-                          const Vec3<Floats>& camera_position) {
+                          const Vec3<Floats>& eye) {
   switch (scene.sh_degree()) {
     case 0:
-      return shade_of_degree<0>(scene, i, mean, camera_position);
+      return shade_of_degree<0>(scene, i, mean, eye);
     case 1:
-      return shade_of_degree<1>(scene, i, mean, camera_position);
+      return shade_of_degree<1>(scene, i, mean, eye);
     case 2:
-      return shade_of_degree<2>(scene, i, mean, camera_position);
+      return shade_of_degree<2>(scene, i, mean, eye);
     default:
-      return shade_of_degree<3>(scene, i, mean, camera_position);
+      return shade_of_degree<3>(scene, i, mean, eye);
   }
 }
 
@@ -117,13 +116,13 @@ inline Vec3<Floats> shade(const SceneStore& scene, std::size_t i, const Vec3<Flo
 /// are used; others are shaded, and cached if there is room.
 HWY_INLINE Vec3<Floats> colour_of(const ClusterColours& colours, const SceneStore& scene,
                                   std::size_t i, std::size_t at, const Vec3<Floats>& mean,
-                                  const Vec3<Floats>& camera_position) {
-  if (colours.rgb == nullptr) return shade(scene, i, mean, camera_position);
+                                  const Vec3<Floats>& eye) {
+  if (colours.rgb == nullptr) return shade(scene, i, mean, eye);
   constexpr std::uint32_t all_lanes = (1u << Floats::count) - 1u;
   std::uint32_t& shaded = (*colours.shaded)[at / 32];
   float* const rgb = colours.rgb + at;
   if ((shaded >> (at % 32) & 1u) == 0) {
-    const Vec3<Floats> colour = shade(scene, i, mean, camera_position);
+    const Vec3<Floats> colour = shade(scene, i, mean, eye);
     colour.x.store(rgb);
     colour.y.store(rgb + cluster_size);
     colour.z.store(rgb + 2 * cluster_size);

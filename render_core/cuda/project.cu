@@ -41,7 +41,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const Splat splat = make_splat<listing == Listing::trails>(p.scene, p.camera, p.shape, i, centre);
   const math::CameraModel<float>& now = p.camera.now.single;
   const PackedColour colour =
-      pack(shade(sh, p.scene.sh_degree, math::view_direction<float>(now.position, centre.mean)));
+      pack(shade(sh, p.scene.sh_degree, math::view_direction<float>(now.eye, centre.mean)));
   p.records[v] = {splat.centre_px, splat.whitening, splat.log2_opacity, colour};
   p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
   if (p.splat_depth != nullptr) p.splat_depth[v] = splat.depth;

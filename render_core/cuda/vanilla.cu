@@ -77,8 +77,8 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const ushort4 box = box_of(centre, math::three_sigma_radius(g), p.shape);
   const std::uint32_t tiles = static_cast<std::uint32_t>(box.z - box.x) * (box.w - box.y);
   if (tiles == 0) return;
-  const auto colour = shade(load_sh(p.scene, i), p.scene.sh_degree,
-                            math::view_direction<float>(camera.position, mean));
+  const auto colour =
+      shade(load_sh(p.scene, i), p.scene.sh_degree, math::view_direction<float>(camera.eye, mean));
   p.records[i] = {centre, math::whitening(g), log2_opacity, pack(colour)};
   p.depth[i] = depth;
   p.box[i] = box;

@@ -27,9 +27,12 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
   }
 }
 
-/// Only the paper's pipeline has groups. The others draw each frame for itself.
+/// Only the paper's pipeline has groups, of perspective pictures. Others are drawn each for itself.
 FramePlan FrameDriver::plan(const FrameRequest& request) {
-  if (settings_.pipeline != Pipeline::paper) return {.window_end = request.camera};
+  if (settings_.pipeline != Pipeline::paper || request.camera.orthographic) {
+    groups_.forget();
+    return {.window_end = request.camera};
+  }
   return groups_.plan(request.camera, request.forecast, nearest_depth_);
 }
 

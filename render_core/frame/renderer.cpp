@@ -32,8 +32,10 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   const glm::vec2 centre = camera.principal_point_px;
   if (!std::isfinite(centre.x) || !std::isfinite(centre.y)) return "principal point is not finite";
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
-  if (!finite(camera.clip.normal) || !std::isfinite(camera.clip.offset))
-    return "clip plane is not finite";
+  const ClipBox& clip = camera.clip;
+  for (int i = 0; i < 3; ++i)
+    if (!finite(clip.axes[i]) || !(clip.low[i] <= clip.high[i]))
+      return "clip box is not finite, or empty";
   const Crop& crop = camera.crop;
   if (crop != Crop{} && (glm::any(glm::lessThan(crop.from_px, glm::ivec2(0))) ||
                          glm::any(glm::greaterThan(crop.from_px + size, crop.whole_px))))

@@ -19,14 +19,19 @@ namespace CATGS_MATH_NAMESPACE {
 // world units. Infinity means that nothing is hidden.
 
 /// Parts around a place whose ends count there: 1 for a still camera, and more with the parallax of
-/// its step. -1 where the last picture hides nothing: after a larger step or another clip plane, or
-/// where no depth is known. `mean_inverse_depth`: of what the last picture drew, 1 / world units;
-/// 0: not known.
+/// its step. -1 where the last picture hides nothing: after a larger step or another clip box,
+/// where rays are parallel, or where no depth is known. `mean_inverse_depth`: of what the last
+/// picture drew, 1 / world units; 0: not known.
 template <class T>
 CATGS_HD_INLINE int occlusion_radius(const CameraModel<T>& now, const CameraModel<T>& last,
                                      T mean_inverse_depth, int part_px) {
-  const Vec3<T> step = now.position - last.position, turn = now.clip_normal - last.clip_normal;
-  if (dot(turn, turn) > T(0.0) || now.clip_offset != last.clip_offset) return -1;
+  const Vec3<T> step = now.position - last.position;
+  if (now.z_offset + last.z_offset > T(0.0)) return -1;
+  for (int i = 0; i < 3; ++i) {
+    const ClipSides<T>&a = now.clip[i], &b = last.clip[i];
+    const Vec3<T> turn = a.axis - b.axis;
+    if (dot(turn, turn) > T(0.0) || a.low != b.low || a.high != b.high) return -1;
+  }
   // How far near surfaces move against those behind them. With parts of the place alone (radius 0),
   // blocks fell to 13 dB where surfaces came out behind others.
   const T parallax_px = T(2.0) * now.focal_px.x * mean_inverse_depth * sqrt(dot(step, step));

@@ -63,8 +63,8 @@ struct ProjectedGaussian {
 };
 
 /// EWA projection (Zwicker et al. 2001): Sigma2 = J W Sigma W^T J^T + low_pass I, J the Jacobian of
-/// the perspective projection at the centre clamped to the field of view. `depth` is
-/// view_depth() > 0.
+/// the perspective projection at the centre clamped to the field of view. An orthographic
+/// projection is linear, and exact. `depth` is view_depth() > 0.
 ///
 /// Works on the square root M = J W L, so that the determinant is a sum of positive terms
 /// (Cauchy-Binet): |m_u x m_v|^2 + low_pass (|m_u|^2 + |m_v|^2) + low_pass^2. The textbook
@@ -73,7 +73,7 @@ template <class T>
 CATGS_HD_INLINE ProjectedGaussian<T> project(const CameraModel<T>& camera, const Vec3<T>& mean,
                                              const CovarianceFactor<T>& l, T depth) {
   const Vec3<T> offset = mean - camera.position;
-  const T inverse_depth = T(1.0) / depth;
+  const T inverse_depth = T(1.0) / perspective_divisor(camera, depth);
   const Vec2<T> slope{dot(camera.right, offset) * inverse_depth,
                       dot(camera.down, offset) * inverse_depth};
 
@@ -81,8 +81,8 @@ CATGS_HD_INLINE ProjectedGaussian<T> project(const CameraModel<T>& camera, const
   out.centre_px = {mul_add(camera.focal_px.x, slope.x, camera.principal_point_px.x),
                    mul_add(camera.focal_px.y, slope.y, camera.principal_point_px.y)};
 
-  const T u = clamp(slope.x, camera.slope_min.x, camera.slope_max.x);
-  const T v = clamp(slope.y, camera.slope_min.y, camera.slope_max.y);
+  const T u = camera.z_weight * clamp(slope.x, camera.slope_min.x, camera.slope_max.x);
+  const T v = camera.z_weight * clamp(slope.y, camera.slope_min.y, camera.slope_max.y);
   const Vec3<T> jw_u =
       (camera.right - camera.forward * u) * (camera.focal_px.x * inverse_depth);  // J W, row u
   const Vec3<T> jw_v = (camera.down - camera.forward * v) * (camera.focal_px.y * inverse_depth);

@@ -33,11 +33,9 @@ struct ReferenceSplat {
 
 math::Vec3<double> to_vec3(const glm::vec3& v) { return {v.x, v.y, v.z}; }
 
-math::Vec3<double> shade(const GaussianCloud& cloud, std::size_t i,
-                         const math::Vec3<double>& camera_position) {
+math::Vec3<double> shade(const GaussianCloud& cloud, std::size_t i, const math::Vec3<double>& eye) {
   double basis[16];
-  math::sh_basis(math::view_direction(camera_position, to_vec3(cloud.mean[i])), cloud.sh_degree,
-                 basis);
+  math::sh_basis(math::view_direction(eye, to_vec3(cloud.mean[i])), cloud.sh_degree, basis);
   glm::dvec3 sum(0.0);
   for (int k = 0; k < cloud.sh_count(); ++k) sum += basis[k] * glm::dvec3(cloud.sh_of(i)[k]);
   return {math::colour_from_sh_sum(sum.x), math::colour_from_sh_sum(sum.y),
@@ -67,7 +65,7 @@ std::vector<ReferenceSplat> project_all(const GaussianCloud& cloud, const Camera
     if (!(splat.reach >= 0.0)) continue;
     splat.centre_px = projected.centre_px;
     splat.whitening = math::whitening(projected);
-    splat.colour = shade(cloud, i, camera.position);
+    splat.colour = shade(cloud, i, camera.eye);
     splats.push_back(splat);
   }
   std::ranges::stable_sort(splats, {}, &ReferenceSplat::depth);

@@ -78,7 +78,8 @@ Cluster ClusterBounds::cluster() const {
 // with k its extent in standard deviations, sigma its largest one and s the clamped slope. Since
 // sqrt(a + b) <= sqrt(a) + sqrt(b), it stays left of the first pixel centre when
 //   f x + (c + k_max sqrt(low_pass) - 0.5) z + f sqrt(1 + s_max^2) k sigma < 0:
-// a half-space moved by the Gaussian's reach k sigma. Likewise for the other sides.
+// a half-space moved by the Gaussian's reach k sigma. Likewise for the other sides. Where rays are
+// parallel, 1 stands in place of z, and s is 0.
 ClusterCuller::ClusterCuller(const Camera& camera) {
   const auto model = math::make_camera_model(camera);
   const auto vec3 = [](const math::Vec3<double>& v) { return glm::dvec3(v.x, v.y, v.z); };
@@ -94,8 +95,9 @@ ClusterCuller::ClusterCuller(const Camera& camera) {
                      static_cast<float>(reach_factor)};
   };
   const auto side = [&](const glm::dvec3& axis, double focal, double from_edge, double slope) {
-    const glm::dvec3 normal = (axis * focal + forward * (from_edge + slack)) / focal;
-    return half_space(normal, std::sqrt(1.0 + slope * slope), 0.0);
+    const double edge = (from_edge + slack) / focal, steepness = model.z_weight * slope;
+    return half_space(axis + forward * (model.z_weight * edge),
+                      std::sqrt(1.0 + steepness * steepness), model.z_offset * edge);
   };
   const auto steepest = [](double a, double b) { return std::max(std::abs(a), std::abs(b)); };
   const double slope_x = steepest(model.slope_min.x, model.slope_max.x);
@@ -107,7 +109,11 @@ ClusterCuller::ClusterCuller(const Camera& camera) {
   half_spaces_[2] = side(-right, f.x, size.x - c.x, slope_x);
   half_spaces_[3] = side(down, f.y, c.y, slope_y);
   half_spaces_[4] = side(-down, f.y, size.y - c.y, slope_y);
-  half_spaces_[5] = {-camera.clip.normal, camera.clip.offset, 0.0f};
+  const ClipBox& clip = camera.clip;
+  for (int i = 0; i < 3; ++i) {
+    if (std::isfinite(clip.low[i])) half_spaces_[count_++] = {clip.axes[i], -clip.low[i], 0.0f};
+    if (std::isfinite(clip.high[i])) half_spaces_[count_++] = {-clip.axes[i], clip.high[i], 0.0f};
+  }
 }
 
 }  // namespace catgs

@@ -72,7 +72,7 @@ class ClusterCuller {
   /// cameras.
   [[nodiscard]] CATGS_HD unsigned beyond(const Cluster& cluster) const {
     unsigned beyond = 0;
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < count_; ++i) {
       const HalfSpace& h = half_spaces_[i];
       const float centre = h.normal.x * cluster.centre.x + h.normal.y * cluster.centre.y +
                            h.normal.z * cluster.centre.z + h.offset;
@@ -86,13 +86,15 @@ class ClusterCuller {
   }
 
  private:
-  static constexpr int count = 6;
+  static constexpr int view_sides = 5,
+                       most = view_sides + 6;  // the near plane is one of the view's
   struct HalfSpace {
     glm::vec3 normal;  // towards the image
     float offset;
     float reach_factor;  // inward shift of the half-space per world unit of a Gaussian's reach
   };
-  HalfSpace half_spaces_[count];
+  HalfSpace half_spaces_[most];
+  int count_ = view_sides;
 };
 
 /// Whether a cluster is outside all the way from one camera to another. A straight path through

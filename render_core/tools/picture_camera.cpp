@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 
@@ -14,6 +15,8 @@
 namespace catgs {
 namespace {
 
+constexpr const char* orthographic_word = " orthographic";
+
 double largest(const glm::vec2& v) { return std::max(std::abs(v.x), std::abs(v.y)); }
 
 }  // namespace
@@ -23,7 +26,8 @@ std::string camera_text(const PictureCamera& of) {
   const glm::vec2 &f = of.camera.focal_px, &c = of.camera.principal_point_px;
   const glm::dvec3 p = of.position(), &o = of.origin;
   return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", p.x, p.y, p.z, q.x, q.y, q.z, q.w,
-                     f.x, f.y, c.x, c.y, o.x, o.y, o.z);
+                     f.x, f.y, c.x, c.y, o.x, o.y, o.z) +
+         (of.camera.orthographic ? orthographic_word : "");
 }
 
 std::optional<PictureCamera> camera_of_picture(const std::filesystem::path& path) {
@@ -38,6 +42,8 @@ std::optional<PictureCamera> camera_of_picture(const std::filesystem::path& path
     text >> *number;
   if (!text) return std::nullopt;
   if (text >> origin.x >> origin.y >> origin.z) of.origin = origin;
+  std::string word;
+  camera.orthographic = text >> word && " " + word == orthographic_word;
   position = glm::vec3(p - of.origin);
   return of;
 }
@@ -52,6 +58,7 @@ CameraDifference::CameraDifference(const PictureCamera& of_a, const PictureCamer
             std::atan2(glm::length(glm::dvec3(turn.x, turn.y, turn.z)), std::abs(turn.w));
   pixels = std::max(largest(a.focal_px - b.focal_px),
                     largest(a.principal_point_px - b.principal_point_px));
+  if (a.orthographic != b.orthographic) pixels = std::numeric_limits<double>::infinity();
   const double reach = 1.0 + std::max(glm::length(glm::dvec3(pa)), glm::length(glm::dvec3(pb)));
   matters_ = !(units <= 1e-5 * reach && degrees <= 2e-3 && pixels <= 0.02);
 }

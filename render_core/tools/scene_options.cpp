@@ -8,11 +8,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/base/printable.h"
 #include "render_core/frame/renderer.h"
 #include "render_core/math/axis_name.h"
+#include "render_core/math/look_at.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/tools/parse_values.h"
 #include "render_core/tools/progress.h"
@@ -93,28 +96,73 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
       ->each([&options](const std::string&) { options.size_given = true; })
       ->capture_default_str();
   auto* focal = command.add_option("--focal-px", options.focal_px, "Focal length, pixels");
+  auto* fov =
+      command
+          .add_option(
+              "--fov-deg", options.fov_y_deg,
+              fmt::format("Vertical field of view, degrees (default: the lens of the path's "
+                          "file, or {})",
+                          default_fov_y_deg))
+          ->excludes(focal);
   command
-      .add_option("--fov-deg", options.fov_y_deg,
-                  fmt::format("Vertical field of view, degrees (default: the lens of the path's "
-                              "file, or {})",
-                              default_fov_y_deg))
-      ->excludes(focal);
+      .add_option("--orthographic", options.orthographic,
+                  "Parallel rays, for plans and elevations: height of the view, world units")
+      ->excludes(focal)
+      ->excludes(fov);
   command.add_option("--near", options.near_z,
                      "Near plane, world units (default: the scene's hint)");
-  command.add_option("--clip", options.clip,
-                     "Leave out Gaussians whose centre c has dot(N, c) > D, given as NX,NY,NZ,D "
-                     "in the coordinates of the scene's file. It takes the roof off a house");
+  auto* plane = command.add_option(
+      "--clip", options.clip,
+      "Leave out Gaussians whose centre c has dot(N, c) > D, given as NX,NY,NZ,D "
+      "in the coordinates of the scene's file. It takes the roof off a house");
+  command
+      .add_option(
+          "--section", options.section,
+          "Draw only Gaussians with their centre in an upright box, given as "
+          "X,Y,Z,WIDTH,DEPTH,HEIGHT,TURN: its middle in the coordinates of the scene's file, "
+          "its sides in world units, its turn about the vertical in degrees")
+      ->excludes(plane);
 }
+
+namespace {
+
+/// The box of --section: it stands upright, turned about the vertical.
+ClipBox section_box(std::string_view text, const SceneHints& hints) {
+  const auto n = parse_numbers<7>("--section", text, "0,0,0,8,6,2.5,0");
+  const glm::vec3 half_extent = 0.5f * glm::vec3(n[3], n[4], n[5]);
+  if (!glm::all(glm::greaterThan(half_extent, glm::vec3(0.0f))))
+    throw InputError(
+        "--section", "", "has a side that is not positive",
+        "X,Y,Z is the middle, then WIDTH,DEPTH,HEIGHT in world units, TURN in degrees");
+  const glm::quat turn = glm::angleAxis(glm::radians(static_cast<float>(n[6])), hints.up);
+  return oriented_box(glm::dvec3(n[0], n[1], n[2]) - hints.origin, turn * upright(hints.up),
+                      half_extent);
+}
+
+void clip(Camera& camera, const LensOptions& options, const SceneHints& hints) {
+  if (!options.section.empty()) camera.clip = section_box(options.section, hints);
+  if (options.clip.empty()) return;
+  const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
+  const glm::dvec3 normal(plane[0], plane[1], plane[2]);
+  camera.clip = clip_plane(normal, static_cast<float>(plane[3] - glm::dot(normal, hints.origin)));
+  if (camera.clip.axes[0] == glm::vec3(0.0f))
+    throw InputError("--clip", "", "has a normal of 0, which is not a direction",
+                     "NX,NY,NZ points to what is left out, like 0,1,0");
+}
+
+}  // namespace
 
 Camera make_lens(const LensOptions& options, const SceneHints& hints, const Lens& lens) {
   const bool own_size = !options.size_given && lens.size_px.x > 0;
   const glm::ivec2 size_px = own_size ? lens.size_px : parse_size("--size", options.size);
   const float fov_y_rad =
       options.fov_y_deg.value_or(default_fov_y_deg) * std::numbers::pi_v<float> / 180.0f;
-  const float focal_px = options.focal_px.value_or(focal_from_fov_y(fov_y_rad, size_px.y));
+  float focal_px = options.focal_px.value_or(focal_from_fov_y(fov_y_rad, size_px.y));
+  if (options.orthographic) focal_px = static_cast<float>(size_px.y) / *options.orthographic;
   if (!(std::isfinite(focal_px) && focal_px > 0.0f)) {
-    throw InputError("--focal-px, --fov-deg", "", "the focal length must be positive",
-                     "a field of view lies between 0 and 180 degrees");
+    throw InputError("--focal-px, --fov-deg, --orthographic", "",
+                     "the focal length must be positive",
+                     "a field of view lies between 0 and 180 degrees, a view's height over 0");
   }
   if (options.near_z && !(std::isfinite(*options.near_z) && *options.near_z > 0.0f)) {
     throw InputError("--near", "",
@@ -123,16 +171,9 @@ Camera make_lens(const LensOptions& options, const SceneHints& hints, const Lens
   }
   Camera camera = lens.known() && !options.view_given() ? make_camera(lens, size_px)
                                                         : make_camera({}, size_px, focal_px);
+  camera.orthographic = options.orthographic.has_value();
   camera.near_z = options.near_z.value_or(hints.near_z);
-  if (!options.clip.empty()) {
-    const auto plane = parse_numbers<4>("--clip", options.clip, "0,1,0,2.5");
-    const glm::dvec3 normal(plane[0], plane[1], plane[2]);
-    camera.clip = {glm::vec3(normal),
-                   static_cast<float>(plane[3] - glm::dot(normal, hints.origin))};
-    if (camera.clip.normal == glm::vec3(0.0f))
-      throw InputError("--clip", "", "has a normal of 0, which is not a direction",
-                       "NX,NY,NZ points to what is left out, like 0,1,0");
-  }
+  clip(camera, options, hints);
   return camera;
 }
 

@@ -48,17 +48,19 @@ struct LensOptions {
   std::optional<float> focal_px;
   std::optional<float> fov_y_deg;
   std::optional<float> near_z;
-  std::string clip{};  // "nx,ny,nz,offset"; empty: no clip plane
+  std::optional<float> orthographic{};  // height of the view, world units
+  std::string clip{};                   // "nx,ny,nz,offset"; empty: no clip plane
+  std::string section{};                // "x,y,z,width,depth,height,turn"; empty: no section box
   bool size_given = false;
 
   /// Whether the user has said anything about the field of view.
-  [[nodiscard]] bool view_given() const { return focal_px || fov_y_deg; }
+  [[nodiscard]] bool view_given() const { return focal_px || fov_y_deg || orthographic; }
 };
 void add_lens_options(CLI::App& command, LensOptions& options);
 
 /// `lens` gives what the options leave open, as far as it is known. Without --near the
-/// near plane is that of the hints. The clip plane counts from the hints' origin, though the
-/// option counts from the file's 0. Throws InputError.
+/// near plane is that of the hints. What is clipped counts from the hints' origin, though the
+/// options count from the file's 0. Throws InputError.
 Camera make_lens(const LensOptions& options, const SceneHints& hints, const Lens& lens = {});
 
 /// The cameras of the poses of a path that `file` describes, without their poses. One, where the

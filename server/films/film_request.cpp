@@ -46,23 +46,45 @@ glm::ivec2 read_size(const JsonField& field, FilmKind kind) {
   return size_px;
 }
 
+void read_pose(const JsonField& field, glm::dvec3& position, glm::quat& orientation) {
+  const auto number = [&](std::size_t i) { return field[i].precise_number(); };
+  position = {number(0), number(1), number(2)};
+  static_cast<void>(field.as_position(position));  // in range
+  orientation = glm::quat(field.as_orientation({number(6), number(3), number(4), number(5)}));
+}
+
+bool is_length(float value) { return value >= 1e-6f && value <= max_coordinate; }
+
+FilmBox read_box(const JsonField& field) {
+  if (!field.value().is_array() || field.size() != 10)
+    field.fail("is not [x, y, z, qx, qy, qz, qw, half width, half depth, half height]");
+  FilmBox box;
+  read_pose(field, box.centre, box.orientation);
+  for (int k = 0; k < 3; ++k) {
+    box.half_extent[k] = field[static_cast<std::size_t>(7 + k)].number();
+    if (!is_length(box.half_extent[k])) field.fail("has a side that is not positive");
+  }
+  return box;
+}
+
 FilmView read_view(const JsonField& field, const FilmView* before) {
   const std::size_t count = field.value().is_array() ? field.size() : 0;
-  if (count != 8 && !(count == 7 && before))
+  if (count != 8 && count != 9 && !(count == 7 && before))
     field.fail("is not [x, y, z, qx, qy, qz, qw, fov_deg]",
                "give fov_deg in the first view; later ones may leave it out, and a whole number "
                "repeats the view before");
-  const auto number = [&](std::size_t i) { return field[i].precise_number(); };
   FilmView view;
-  view.position = {number(0), number(1), number(2)};
-  static_cast<void>(field.as_position(view.position));  // in range
-  view.orientation = glm::quat(field.as_orientation({number(6), number(3), number(4), number(5)}));
+  read_pose(field, view.position, view.orientation);
   if (count == 7) {
     view.fov_y_rad = before->fov_y_rad;
+    view.view_height = before->view_height;
   } else {
-    if (!(number(7) >= 5.0 && number(7) <= 160.0))
+    if (!(field[7].number() >= 5.0f && field[7].number() <= 160.0f))
       field.fail("has a field of view that is not between 5 and 160 degrees");
     view.fov_y_rad = glm::radians(field[7].number());
+    if (count == 9) view.view_height = field[8].number();
+    if (count == 9 && !is_length(view.view_height))
+      field.fail("has a view whose height is not a positive number of world units");
   }
   return view;
 }
@@ -76,6 +98,7 @@ FilmRequest parse_film_request(std::string_view json) {
   FilmRequest request;
   request.kind = read_kind(root.at("kind"));
   request.size_px = read_size(root.at("size"), request.kind);
+  if (const auto box = root.find("box")) request.box = read_box(*box);
   const JsonField views = root.at("views");
   const std::size_t most = request.kind == FilmKind::film ? most_film_frames : 1;
   const auto check_count = [&](std::size_t more) {

@@ -63,10 +63,14 @@ class Progress {
   TimePoint reported_ = Clock::now();
 };
 
-FrameRequest request_of(const SceneEntry& scene, const FilmView& view, glm::ivec2 size_px) {
+FrameRequest request_of(const SceneEntry& scene, const FilmRequest& wanted, const FilmView& view,
+                        glm::ivec2 size_px) {
   FrameRequest request;
-  request.camera = make_camera(view.pose_about(scene.facts.origin), size_px,
-                               focal_from_fov_y(view.fov_y_rad, size_px.y), scene.facts.near_z);
+  request.camera = make_view_camera(view.pose_about(scene.facts.origin), size_px, view.fov_y_rad,
+                                    view.view_height, scene.facts.near_z);
+  if (const auto& box = wanted.box)
+    request.camera.clip = oriented_box(glm::vec3(box->centre - scene.facts.origin),
+                                       box->orientation, box->half_extent);
   request.background = colour_of(scene.facts.about.background_rgb);
   request.waits_for_pages = true;
   return request;
@@ -106,7 +110,7 @@ void draw_picture(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
   const glm::ivec2 size_px = wanted.size_px;
   const auto width = static_cast<std::size_t>(size_px.x);
   std::vector<std::uint8_t> bytes(3 * width * static_cast<std::size_t>(size_px.y));
-  draw_parts(scene, request_of(scene.entry(), wanted.views.front(), size_px), progress,
+  draw_parts(scene, request_of(scene.entry(), wanted, wanted.views.front(), size_px), progress,
              until_written, [&](int x, int y, const float* rgb) {
                std::uint8_t* const to = bytes.data() + 3 * (width * static_cast<std::size_t>(y) +
                                                             static_cast<std::size_t>(x));
@@ -119,7 +123,7 @@ void draw_picture(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
 
 void draw_around(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
                  Progress& progress) {
-  FrameRequest request = request_of(scene.entry(), wanted.views.front(), wanted.size_px);
+  FrameRequest request = request_of(scene.entry(), wanted, wanted.views.front(), wanted.size_px);
   request.camera.world_from_camera =
       levelled(request.camera.world_from_camera, scene.entry().facts.up);
   ThreadPool own(1);  // helpers would not be there for visitors meanwhile
@@ -156,7 +160,7 @@ void draw_frames(const FilmRequest& wanted, FilmScene& scene, ResultFile& file,
   progress.begin(1.0, count);
   for (std::size_t i = 0; i < count; ++i) {
     if (!scene.has_view() || wanted.views[i] != wanted.views[i - 1])
-      render(scene, request_of(scene.entry(), wanted.views[i], wanted.size_px), frame);
+      render(scene, request_of(scene.entry(), wanted, wanted.views[i], wanted.size_px), frame);
     video->write(frame);
     if (file.size() > most_film_bytes)
       throw NotDrawn(fmt::format("the film is larger than {} MiB", most_film_bytes >> 20));

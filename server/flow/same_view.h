@@ -19,6 +19,7 @@ inline bool same_view(const PoseSample& a, const PoseSample& b, float near_z) {
   const glm::quat delta = p.orientation - q.orientation;
   const glm::quat sum = p.orientation + q.orientation;
   const float half_angle = std::min(glm::length(delta), glm::length(sum));
+  if (std::abs(a.view_height - b.view_height) > tolerance * a.view_height) return false;
   return 2.0f * half_angle <= tolerance && std::abs(a.fov_y_rad - b.fov_y_rad) <= tolerance &&
          glm::length(p.position - q.position) <= tolerance * near_z;
 }

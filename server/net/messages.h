@@ -31,7 +31,8 @@ struct PoseSample {
   std::int64_t client_time_us = 0;  // client's clock
   Pose world_from_camera;
   float fov_y_rad = 0.0f;
-  bool at_rest = false;  // nothing moves the camera
+  bool at_rest = false;      // nothing moves the camera
+  float view_height = 0.0f;  // world units, of an orthographic view; 0: perspective
 };
 
 struct PosePath {
@@ -129,7 +130,7 @@ struct UnknownMessage {};
 
 using ClientMessage = std::variant<UnknownMessage, Hello, PoseSample, PosePath, Ack, Settings,
                                    SelectScene, RequestIdr, Pause, Bye, Pick, Present, Follow,
-                                   Reached, Prepare, Ping, ClipPlane, Markers, Show>;
+                                   Reached, Prepare, Ping, ClipBox, Markers, Show>;
 
 struct SceneFacts {
   std::string scene_id;
@@ -141,6 +142,7 @@ struct SceneFacts {
   glm::vec3 focus{0.0f};
   glm::vec3 limits_min{0.0f};
   glm::vec3 limits_max{0.0f};
+  glm::vec3 content_min{0.0f}, content_max{0.0f};  // of nearly all Gaussians; the same: not known
   float near_z = 0.2f;
   float scale = 1.0f;
   glm::dvec3 origin{0.0};       // that all places on the wire are about, see scene_origin.h

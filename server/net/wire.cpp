@@ -44,6 +44,10 @@ void fill(const SceneFacts& scene, v1::SceneFacts& out) {
   fill(scene.focus, *out.mutable_focus());
   fill(scene.limits_min, *out.mutable_limits_min());
   fill(scene.limits_max, *out.mutable_limits_max());
+  if (scene.content_min != scene.content_max) {
+    fill(scene.content_min, *out.mutable_content_min());
+    fill(scene.content_max, *out.mutable_content_max());
+  }
   out.set_near_z(scene.near_z);
   out.set_scale(scene.scale);
   out.set_credits(scene.about.credits);
@@ -159,6 +163,7 @@ void fill(const Lead& lead, v1::ServerMessage& out) {
   fill(lead.camera->world_from_camera, *camera.mutable_world_from_camera());
   camera.set_fov_y_rad(lead.camera->fov_y_rad);
   camera.set_at_rest(lead.camera->at_rest);
+  camera.set_view_height(lead.camera->view_height);
 }
 
 void fill(const Pinged& pinged, v1::ServerMessage& out) {
@@ -210,6 +215,7 @@ v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   header.set_pose_client_time_us(ticket.pose_client_time_us);
   fill(ticket.render_pose, *header.mutable_render_pose());
   header.set_fov_y_rad(ticket.fov_y_rad);
+  header.set_view_height(ticket.view_height);
   header.set_codec(to_wire(ticket.codec));
   header.set_idr(ticket.idr);
   header.set_width_px(static_cast<std::uint32_t>(ticket.size_px.x));

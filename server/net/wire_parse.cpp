@@ -33,6 +33,7 @@ constexpr std::uint32_t max_pose_age_us = 10'000'000;
 constexpr int max_path_samples = 256;
 constexpr int max_decoders = 8;
 constexpr float max_clip_offset = 1e30f;  // sums with it stay finite
+constexpr float least_length = 1e-6f;     // world units, of boxes and views
 constexpr std::uint32_t most_tours = 32, most_stops = 256;
 
 /// Thrown and caught only in this file, to leave nested message parts.
@@ -70,13 +71,13 @@ glm::vec3 parse(std::string_view field, const v1::Vec3& v) {
   return {in_range('x', v.x()), in_range('y', v.y()), in_range('z', v.z())};
 }
 
-Pose parse(const v1::Pose& message) {
+Pose parse(const v1::Pose& message, const std::string& field = "pose") {
   Pose pose;
-  pose.position = parse("pose.position", message.position());
+  pose.position = parse(field + ".position", message.position());
   const auto& q = message.orientation();
   const glm::quat orientation(q.w(), q.x(), q.y(), q.z());
   const float norm = glm::length(orientation);
-  checked("pose.orientation norm", norm, 0.9f, 1.1f);
+  checked(field + ".orientation norm", norm, 0.9f, 1.1f);
   pose.orientation = orientation / norm;
   return pose;
 }
@@ -89,6 +90,9 @@ PoseSample parse(const v1::PoseSample& message) {
   sample.world_from_camera = parse(message.world_from_camera());
   sample.fov_y_rad = checked("pose.fov_y_rad", message.fov_y_rad(), 0.1f, 2.8f);
   sample.at_rest = message.at_rest();
+  if (message.view_height() != 0.0f)
+    sample.view_height =
+        checked("pose.view_height", message.view_height(), least_length, max_coordinate);
   return sample;
 }
 
@@ -175,11 +179,21 @@ Pick parse(const v1::Pick& message) {
   return pick;
 }
 
-ClipPlane parse(const v1::Clip& message) {
-  const ClipPlane plane{
-      parse("clip.normal", message.normal()),
-      checked("clip.offset", message.offset(), -max_clip_offset, max_clip_offset)};
-  return plane.normal == glm::vec3(0.0f) ? ClipPlane{} : plane;
+ClipBox parse(const v1::Clip& message) {
+  if (message.has_box()) {
+    const Pose pose = parse(message.box().world_from_box(), "clip.box");
+    const auto half = [](std::string_view field, float extent) {
+      return checked(field, extent, least_length, max_coordinate);
+    };
+    const auto& extent = message.box().half_extent();
+    return oriented_box(
+        pose.position, pose.orientation,
+        {half("clip.box.half_extent.x", extent.x()), half("clip.box.half_extent.y", extent.y()),
+         half("clip.box.half_extent.z", extent.z())});
+  }
+  const glm::vec3 normal = parse("clip.normal", message.normal());
+  const float offset = checked("clip.offset", message.offset(), -max_clip_offset, max_clip_offset);
+  return normal == glm::vec3(0.0f) ? ClipBox{} : clip_plane(normal, offset);
 }
 
 Markers parse(const v1::Markers& message) {

@@ -26,6 +26,7 @@ struct FrameTicket {
   std::int64_t pose_client_time_us = 0;  // that sample's time on the client's clock
   Pose render_pose;
   float fov_y_rad = 0.0f;
+  float view_height = 0.0f;  // as in PoseSample
 
   Codec codec = Codec::h264;
   bool idr = false;

@@ -14,6 +14,7 @@
 #include "render_core/base/error.h"
 #include "render_core/base/thread_pool.h"
 #include "render_core/math/axis_name.h"
+#include "render_core/scene/analysis/robust_bounds.h"
 #include "render_core/scene/files/load_scene.h"
 #include "render_core/scene/scene.h"
 #include "render_core/scene/tree/tree_file.h"
@@ -27,6 +28,8 @@
 
 namespace catgs {
 namespace {
+
+constexpr float stray_share = 0.01f;  // of the Gaussians, beyond the content on each side
 
 template <typename T>
 T parse_number(const std::string& spec, std::string_view text) {
@@ -184,6 +187,10 @@ std::shared_ptr<const SceneEntry> load_scene(
   entry->in_pages = tree != nullptr;
   entry->coarse = representation.most_gaussians > 0;
   entry->surface = std::make_shared<const SurfacePoints>(scene.cloud, *core.pool);
+  if (const auto content = robust_bounds(scene.cloud, stray_share)) {
+    entry->facts.content_min = content->min;
+    entry->facts.content_max = content->max;
+  }
   use_hints(scene.hints, scene.name, entry->surface.get(), entry->facts);
   for (const std::string& note : scene.notes)
     log_warning({.event = "scene_note", .scene = entry->facts.scene_id}, "{}: {}", spec, note);

@@ -26,10 +26,13 @@ struct SceneEntry {
   ToursAnswers tours{};
   std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 
-  [[nodiscard]] Picked seen_along(const Pick& ray) const {
-    const auto hit = surface ? surface->hit_along(ray.origin, ray.direction) : std::nullopt;
-    if (!hit) return {ray.id, std::nullopt};
-    return {ray.id, hit->distance, hit->spread};
+  /// What a ray meets of that which the box leaves in.
+  [[nodiscard]] Picked seen_along(const Pick& ray, const ClipBox& clip) const {
+    const RayPart part = kept_part(clip, ray.origin, ray.direction);
+    if (!surface || part.begin > part.end) return {ray.id, std::nullopt};
+    const auto hit = surface->hit_along(ray.origin + part.begin * ray.direction, ray.direction);
+    if (!hit || part.begin + hit->distance > part.end) return {ray.id, std::nullopt};
+    return {ray.id, part.begin + hit->distance, hit->spread};
   }
 };
 

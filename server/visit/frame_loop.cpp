@@ -38,9 +38,9 @@ void FrameLoop::enter_scene(const SceneFacts& scene) {
   settled_ = true;
 }
 
-void FrameLoop::clip(const ClipPlane& plane, TimePoint now) {
-  if (plane == clip_) return;
-  clip_ = plane;
+void FrameLoop::clip(const ClipBox& box, TimePoint now) {
+  if (box == clip_) return;
+  clip_ = box;
   shown_.reset();
   rest_.moved(now);
 }
@@ -117,10 +117,11 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   ticket.pose_client_time_us = aim.client_time_us;
   ticket.render_pose = aim.world_from_camera;
   ticket.fov_y_rad = aim.fov_y_rad;
+  ticket.view_height = aim.view_height;
   ticket.size_px = order.encoding.size_px;
   ticket.pose_received = *pose_received_;
-  order.request.camera = make_camera(aim.world_from_camera, ticket.size_px,
-                                     focal_from_fov_y(aim.fov_y_rad, ticket.size_px.y), near_z_);
+  order.request.camera = make_view_camera(aim.world_from_camera, ticket.size_px, aim.fov_y_rad,
+                                          aim.view_height, near_z_);
   order.request.camera.clip = clip_;
   order.request.background = background_;
   order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();

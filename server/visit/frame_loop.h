@@ -36,8 +36,8 @@ class FrameLoop {
   bool pose_arrived(const PoseSample& sample, TimePoint now);
   void follow(const PosePath& path) { track_.follow(path); }
   /// From the next picture on, until the scene changes.
-  void clip(const ClipPlane& plane, TimePoint now);
-  [[nodiscard]] const ClipPlane& clip() const { return clip_; }
+  void clip(const ClipBox& box, TimePoint now);
+  [[nodiscard]] const ClipBox& clip() const { return clip_; }
   /// The client's newest camera in this scene, if any.
   [[nodiscard]] const std::optional<PoseSample>& camera() const { return track_.newest(); }
   /// Continues from the pose of a resumed client, and from the tour that led it.
@@ -80,7 +80,7 @@ class FrameLoop {
   FlowControl& flow_;
   float near_z_ = 0.0f;
   glm::vec3 background_{0.0f};
-  ClipPlane clip_;
+  ClipBox clip_;
   CameraTrack track_;
   std::optional<TimePoint> pose_received_;
   FramePace pace_;

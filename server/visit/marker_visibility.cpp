@@ -25,17 +25,24 @@ constexpr float hides_before = 0.95f, appears_before = 0.97f;
 
 /// Whether something that is drawn covers `point`.
 bool is_covered(const SurfacePoints& surface, glm::vec3 eye, const glm::vec3& point,
-                const ClipPlane& clip, bool was_hidden) {
-  const float eye_beyond = glm::dot(clip.normal, eye) - clip.offset;
-  const float point_beyond = glm::dot(clip.normal, point) - clip.offset;
-  if (clip.normal != glm::vec3(0.0f) && eye_beyond > 0.0f) {
-    if (point_beyond >= 0.0f) return false;  // nothing between them is drawn
-    eye += (point - eye) * (eye_beyond / (eye_beyond - point_beyond));
-  }
-  const float distance = glm::distance(eye, point);
-  if (!(distance > 1e-6f)) return false;
-  const float before = (was_hidden ? appears_before : hides_before) * distance;
-  return surface.light_from(eye, (point - eye) / distance, before, seen_light) < seen_light;
+                const ClipBox& clip, bool was_hidden) {
+  const float whole = glm::distance(eye, point);
+  if (!(whole > 1e-6f)) return false;
+  const glm::vec3 direction = (point - eye) / whole;
+  const RayPart part = kept_part(clip, eye, direction);
+  const float distance = whole - part.begin;
+  const float before =
+      std::min((was_hidden ? appears_before : hides_before) * distance, part.end - part.begin);
+  if (!(before > 0.0f)) return false;  // nothing between them is drawn
+  eye += part.begin * direction;
+  return surface.light_from(eye, direction, before, seen_light) < seen_light;
+}
+
+/// Where the ray to a point begins: in the plane of an orthographic camera.
+glm::vec3 ray_origin(const PoseSample& camera, const glm::vec3& forward, const glm::vec3& point) {
+  const glm::vec3& position = camera.world_from_camera.position;
+  return camera.view_height > 0.0f ? point - forward * glm::dot(forward, point - position)
+                                   : position;
 }
 
 }  // namespace
@@ -50,18 +57,17 @@ void MarkerVisibility::watch(Markers markers) {
 }
 
 std::optional<HiddenMarkers> MarkerVisibility::test(const SurfacePoints& surface,
-                                                    const PoseSample& camera, const ClipPlane& clip,
+                                                    const PoseSample& camera, const ClipBox& clip,
                                                     TimePoint now) {
   if (markers_.empty() || (last_ && now - *last_ < between_tests)) return std::nullopt;
   last_ = now;
   if (!rays_) rays_.emplace(rays_per_second, rays_at_once, now);
   if (std::exchange(clip_, clip) != clip)
     for (Marker& marker : markers_) marker.tested_from.reset();
-  const glm::vec3 eye = camera.world_from_camera.position;
   const glm::vec3 forward = camera.world_from_camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f);
   for (std::size_t i = 0; i < markers_.size(); ++i) {
     Marker& marker = markers_[next_];
-    const glm::vec3 way = marker.point - eye;
+    const glm::vec3 eye = ray_origin(camera, forward, marker.point), way = marker.point - eye;
     const bool known = marker.tested_from &&
                        glm::distance(*marker.tested_from, eye) <= same_position * glm::length(way);
     if (!known && (!marker.tested_from || glm::dot(forward, way) > 0.0f)) {

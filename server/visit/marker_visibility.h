@@ -21,7 +21,7 @@ class MarkerVisibility {
   /// Call it often. Tests the markers before the camera that have not been tested from about there,
   /// as many as the limits allow. Returns all hidden ones if that is new, once all were tested.
   std::optional<HiddenMarkers> test(const SurfacePoints& surface, const PoseSample& camera,
-                                    const ClipPlane& clip, TimePoint now);
+                                    const ClipBox& clip, TimePoint now);
 
  private:
   struct Marker {
@@ -32,7 +32,7 @@ class MarkerVisibility {
   std::uint32_t id_ = 0;
   std::vector<Marker> markers_;
   std::size_t next_ = 0;  // the marker whose turn it is
-  ClipPlane clip_;        // of the tests
+  ClipBox clip_;          // of the tests
   std::optional<std::vector<std::uint32_t>> told_;
   std::optional<TimePoint> last_;  // test
   std::optional<RateLimit> rays_;

@@ -99,10 +99,10 @@ void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
       stream_.idr().missed();
     }
     life_.pause(pause->paused);
-  } else if (const auto* plane = std::get_if<ClipPlane>(&message)) {
-    frames_.clip(*plane, now);
+  } else if (const auto* box = std::get_if<ClipBox>(&message)) {
+    frames_.clip(*box, now);
   } else if (const auto* pick = std::get_if<Pick>(&message)) {
-    if (picks_.take(now)) say(stream_.scene()->seen_along(*pick), now);
+    if (picks_.take(now)) say(stream_.scene()->seen_along(*pick, frames_.clip()), now);
   } else if (const auto* markers = std::get_if<Markers>(&message)) {
     markers_.watch(*markers);
   }

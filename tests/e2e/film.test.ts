@@ -5,6 +5,7 @@ import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
 import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
+import { pose_of, settle } from './support/camera';
 import {
   access_token,
   catgs_render,
@@ -63,8 +64,15 @@ describe('an author', () => {
   it('gets a picture of the view', async () => {
     const { page, errors } = await open(link('author'), windows.desktop);
     await open_panel(page);
-    expect(png_size(await made(page, 'picture', '1920 × 1080'))).toEqual([1920, 1080]);
+    const whole = await made(page, 'picture', '1920 × 1080');
+    expect(png_size(whole)).toEqual([1920, 1080]);
     await keep_screenshot(page, 'film-picture');
+    const { position, orientation } = await pose_of(page);
+    const view = [...position, ...orientation, 60].join(',');
+    await page.evaluate((at) => (location.hash = `at=${at}&section=0,900,0,1,1,1,0`), view);
+    await settle(page);
+    const empty = await made(page, 'picture', '1920 × 1080');
+    expect(empty.length).toBeLessThan(whole.length / 10);
     expect(await barriers(page)).toEqual([]);
     expect(errors).toEqual([]);
   });

@@ -42,7 +42,7 @@ const scenes = [
   { id: 'city', title: 'Demo city', credits: 'Ada', licence: 'MIT' },
   { id: 'hall', title: 'The hall' },
 ];
-const panels = ['quality', 'stats', 'share', 'help'] as const;
+const panels = ['quality', 'stats', 'views', 'share', 'help'] as const;
 
 // axe-core's rules find the same in both windows: it looks at whole pages on a desktop, and at panels on a phone.
 const is_desktop = (window: string): boolean => window === 'desktop';
@@ -101,6 +101,7 @@ describe.each([
     if (is_desktop(name)) expect(await barriers(page)).toEqual([]);
     for (const panel of panels) {
       await page.locator(`#button-${panel}`).click();
+      if (panel === 'views') await page.locator('#views-panel fieldset').last().waitFor();
       if (panel === 'stats') await page.locator('#stats-panel .uplot').last().waitFor();
       await keep_screenshot(page, `language-${language}-${name}-${panel}`);
       expect(await cut_off(page)).toEqual([]);
@@ -136,6 +137,10 @@ describe.each([
 it.each(['fr', 'es', 'it', 'zh', 'ko'])('?lang=%s chooses a language', async (lang) => {
   const { page, errors } = await open(`${server.url}?scene=city&lang=${lang}`, windows['phone']);
   expect((await speaks(page))[0]).toMatch(new RegExp(`^${lang}`));
+  await page.locator('#button-views').click();
+  await page.locator('#views-panel fieldset').last().waitFor();
+  await keep_screenshot(page, `language-${lang}-phone-views`);
+  expect(await cut_off(page)).toEqual([]);
   await page.locator('#button-help').click();
   await keep_screenshot(page, `language-${lang}-phone-help`);
   expect([await cut_off(page), await barriers(page), errors]).toEqual([[], [], []]);

@@ -1,10 +1,10 @@
 import { beforeEach, describe, expect, it } from 'vitest';
 import { axis_angle, identity, multiply, type Quat } from '#client/base/vector';
-import type { Eye } from '#client/camera/eye';
+import { widened_fov, type Eye } from '#client/camera/eye';
 import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
 import type { Placing, Presenter } from '#client/present/presenter';
-import { warped, widened_fov } from '#client/present/warp';
+import { warped } from '#client/present/warp';
 import { frame_sizes } from '#client/worker/frame_sizes';
 import golden from '../support/warp_golden.json';
 

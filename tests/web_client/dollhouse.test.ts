@@ -4,10 +4,10 @@ import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
 import type { CameraMode } from '#client/camera/mode';
 import { Dollhouse } from '#client/walkable_area/dollhouse';
 import { GestureRouter } from '#client/page/gestures';
+import type { Clipping } from '#client/page/clipping';
 import type { Navigation } from '#client/page/navigation';
 import { ceiling_cut, dollhouse_eye, house_around } from '#client/walk/dollhouse';
 import { to_world, type Block, type Stand, type Storey, type WalkMap } from '#client/walk/walk_map';
-import type { WorkerClient } from '#client/worker/client';
 import { camera, expect_vec } from './cameras';
 import { flat_tiles } from './walk_maps';
 
@@ -114,9 +114,11 @@ describe('a visitor of the dollhouse', () => {
     const house = new Dollhouse(
       {
         view: { clientWidth: 160, clientHeight: 90 } as HTMLElement,
-        worker: {
-          post: ({ plane }: { plane: unknown }) => clips.push(plane),
-        } as unknown as WorkerClient,
+        clipping: {
+          set ceiling(plane: unknown) {
+            clips.push(plane);
+          },
+        } as Clipping,
         navigation: navigation as unknown as Navigation,
         reduced_motion: true,
         go_to: (stand) => chosen.push(stand),

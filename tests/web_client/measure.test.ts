@@ -88,12 +88,13 @@ describe('measuring', () => {
 describe('a pixel at a point of the scene', () => {
   const orientation: Quat = [0, 0.6, 0, 0.8];
   it.each([
-    [0.4, 0.5, 0.5],
-    [1, 0.9, 0.2],
-    [2.2, 0.5, 0.5],
-    [2.2, 0.95, 0.9],
-  ])('has its size in a field of view of %d rad at %d, %d', (fov_y_rad, x, y) => {
-    const eye = { position: [1, 2, 3] as Vec3, orientation, fov_y_rad };
+    [0.4, undefined, 0.5, 0.5],
+    [1, undefined, 0.9, 0.2],
+    [2.2, undefined, 0.5, 0.5],
+    [2.2, undefined, 0.95, 0.9],
+    [1, 12, 0.9, 0.2],
+  ])('has its size in %d rad, or a view %s high, at %d, %d', (fov_y_rad, view_height, x, y) => {
+    const eye = { position: [1, 2, 3] as Vec3, orientation, fov_y_rad, view_height };
     const { origin, direction } = ray_through(eye, x, y, 2);
     const point = add(origin, scale(direction, 7));
     const below = rotate(orientation, [0, pixel_at(point, eye, 500), 0]);

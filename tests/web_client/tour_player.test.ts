@@ -3,6 +3,7 @@ import { describe, expect, it } from 'vitest';
 import { identity } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import type { Flight, PathSample } from '#client/camera/flight';
+import type { Section } from '#client/camera/section';
 import { TourPlayer, type TourState } from '#client/tour/player';
 import type { Tour } from '#client/tour/tour';
 import { untranslated } from '#client/tour/words';
@@ -35,6 +36,7 @@ describe('the player', () => {
     let flight: { way: Flight; ended: (arrived: boolean) => void } | undefined;
     const paths: (readonly PathSample[])[] = [];
     const reached: [number, number][] = [];
+    const sections: (Section | undefined)[] = [];
     let state: TourState | undefined;
     let speaks = false;
     let heard: (() => void) | undefined;
@@ -59,6 +61,7 @@ describe('the player', () => {
         timers: time,
         now_us: () => time.now_us(),
         announce: (path) => paths.push(path),
+        show_section: (section) => sections.push(section),
         reached: (tour_index, stop_index) => {
           expect(state?.stop_index).toBe(stop_index); // the page knows where the visitor is
           reached.push([tour_index, stop_index]);
@@ -77,6 +80,7 @@ describe('the player', () => {
       time,
       paths,
       reached,
+      sections,
       stop_flight,
       state: () => state!,
       speak: () => void (speaks = true),
@@ -132,6 +136,18 @@ describe('the player', () => {
     fall_silent(); // nobody waits for it any more
     expect(flying()).toBeUndefined();
     expect(state()).toMatchObject({ stop_index: 1, playing: false });
+  });
+
+  it('shows the section of each stop, and all at stops without one', () => {
+    const { player, arrive, sections } = guided();
+    const section: Section = [0, 0, 0, 1, 1, 1, 0];
+    const [first, ...others] = tour.stops;
+    player.load([{ ...tour, stops: [{ ...first!, section }, ...others] }]);
+    player.next();
+    arrive();
+    player.next();
+    player.be_shown(0, 0);
+    expect(sections).toEqual([section, undefined, section]);
   });
 
   it('goes from stop to stop and around', () => {

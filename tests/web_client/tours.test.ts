@@ -111,7 +111,12 @@ describe('tours of a sidecar', () => {
   });
 
   it('that cannot be read do not hide the others', () => {
-    const { tours, start, problems } = read_document({ tours: {}, settings }, up, 1, 16 / 9);
+    const { tours, start, problems } = read_document(
+      { tours: {}, settings, read_settings: read_supersplat },
+      up,
+      1,
+      16 / 9,
+    );
     expect(problems).toEqual(['tours: is not a list']);
     expect(tours.length).toBeGreaterThan(0);
     expect(start).toBeDefined();
@@ -124,11 +129,21 @@ describe('tours of a sidecar', () => {
 
   it("take the place of imported stops, so that an author's changes do not stand beside them", () => {
     const own = [{ title: 'Mine', stops: [{ position: [0, 0, 0], orientation: [0, 0, 0, 1] }] }];
-    const { tours, start } = read_document({ tours: own, settings }, up, 1, 1);
+    const { tours, start } = read_document(
+      { tours: own, settings, read_settings: read_supersplat },
+      up,
+      1,
+      1,
+    );
     expect(tours[0]!.title).toBe('Mine');
     expect(tours.slice(1).every(({ way }) => way !== undefined)).toBe(true);
     expect(start).toBeUndefined();
-    const { tours: none } = read_document({ tours: [], settings }, up, 1, 1);
+    const { tours: none } = read_document(
+      { tours: [], settings, read_settings: read_supersplat },
+      up,
+      1,
+      1,
+    );
     expect(none.every(({ way }) => way !== undefined)).toBe(true);
   });
 });

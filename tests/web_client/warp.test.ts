@@ -8,10 +8,10 @@ import {
   rotate,
   type Vec3,
 } from '#client/base/vector';
-import type { Eye } from '#client/camera/eye';
+import { widened_fov, type Eye } from '#client/camera/eye';
 import { project } from '#client/camera/ray';
 import { TurnForecast } from '#client/present/turn_forecast';
-import { reach, uncovered_share, warp_matrix, warped, widened_fov } from '#client/present/warp';
+import { can_show, reach, uncovered_share, warp_matrix, warped } from '#client/present/warp';
 import { WarpPolicy } from '#client/present/warp_policy';
 import golden from '../support/warp_golden.json';
 
@@ -67,6 +67,20 @@ describe('a warped picture', () => {
     ] as const) {
       expect_same_place(on_plane(x, y), picture, view, 5);
     }
+  });
+
+  it('shows all of an orthographic view where it is, whatever its depth and scale', () => {
+    const picture = eye({ orientation: turn, view_height: 9 });
+    const view = eye({ orientation: turn, position: [0.4, -0.3, 2], view_height: 6 });
+    for (const point of [
+      [0, 0, 9],
+      [1, -2, 40],
+    ] as Vec3[]) {
+      expect_same_place(point, picture, view, Infinity);
+    }
+    expect(can_show(picture, view)).toBe(true);
+    expect(can_show(picture, eye({ view_height: 6 }))).toBe(false); // from another side
+    expect(can_show(picture, eye({ orientation: turn }))).toBe(false);
   });
 
   it('is the picture itself where nothing has moved', () => {

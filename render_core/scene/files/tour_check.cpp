@@ -187,9 +187,21 @@ void check_portal(const JsonField& portal) {
   check_ordinal(portal.find("stop"), max_stops);
 }
 
+/// Checks an upright box, as --section has it.
+void check_section(const JsonField& section) {
+  constexpr std::size_t count = 7, first_side = 3, last_side = 5;
+  if (!section.value().is_array() || section.size() != count)
+    section.fail("is not [x, y, z, width, depth, height, turn_deg]");
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_side = i >= first_side && i <= last_side;
+    check_number(section[i], is_side ? 1e-5f : -max_coordinate, max_coordinate);
+  }
+}
+
 void check_stop(const JsonField& stop, const MediaOrigins* origins) {
   check_members(stop, {"title", "caption", "translations", "position", "look_at", "orientation",
-                       "fov_deg", "marker", "stay_s", "fly_s", "media", "narration", "portal"});
+                       "fov_deg", "view_height", "section", "marker", "stay_s", "fly_s", "media",
+                       "narration", "portal"});
   if (const auto media = stop.find("media")) {
     if (media->size() > max_media)
       media->fail(fmt::format("has {} entries, at most {}", media->size(), max_media));
@@ -203,6 +215,8 @@ void check_stop(const JsonField& stop, const MediaOrigins* origins) {
   check_text(stop.find("caption"));
   check_translations(stop, {"title", "caption"});
   check_view(stop);
+  check_number(stop.find("view_height"), 1e-6f, max_coordinate);
+  if (const auto section = stop.find("section")) check_section(*section);
   if (const auto marker = stop.find("marker")) static_cast<void>(marker->position());
   if (const auto portal = stop.find("portal")) check_portal(*portal);
   check_number(stop.find("stay_s"), 0.0f, longest_stay_s);

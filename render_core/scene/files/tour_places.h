@@ -12,10 +12,10 @@ namespace catgs {
 nlohmann::ordered_json page_fields_in_sidecar(const HintFiles& files);
 
 /// Places all that lies in the scene: members "position", "look_at" and "marker" of three numbers,
-/// and "orientation" of four, at any depth, and "error" and "depth" of measures. Everything else
-/// stays, known or not, and so do the places of portals, which are in other scenes. `origin`: of
-/// the placed scene.
+/// and "orientation" of four, at any depth, "section" and "view_height" of stops, and "error" and
+/// "depth" of measures. Everything else stays, known or not, and so do the places of portals, which
+/// are in other scenes. `hints`: of the placed scene.
 void place_tours(nlohmann::ordered_json& tours, const Placement& placement,
-                 const glm::dvec3& origin = glm::dvec3(0.0));
+                 const SceneHints& hints = {});
 
 }  // namespace catgs

@@ -30,6 +30,11 @@ struct CutEye {
                             glm::max(glm::abs(centre), glm::abs(size - centre)) /
                             glm::vec2(camera.focal_px);
     least_cosine = 1.0f / std::sqrt(1.0f + slope.x * slope.x + slope.y * slope.y);
+    if (!camera.orthographic) return;
+    // All depths are as one, where an error has focal_px pixels.
+    forward = glm::vec3(0.0f);
+    least_cosine = behind = 0.0f;
+    near_z = 1.0f;
   }
 
   /// A lower bound of the depths of a box's points in view: the near plane's, the depth of the box,
@@ -56,13 +61,13 @@ struct CutEye {
   /// A node's error in pixels where its Gaussians are, about: behind the nearest point of its box.
   /// A large box around the camera has little beside it, so that the bound counts it for too much.
   [[nodiscard]] float typical_px(float error, const Cluster& bounds) const {
-    constexpr float behind = 0.1f;  // of the box's half diagonal
     return error * focal_px / (least_depth(bounds) + behind * glm::length(bounds.half_extent));
   }
 
   glm::vec3 position, forward;  // world; the view axis, unit
   float focal_px, near_z;
-  float least_cosine;  // between the axis and what is in view
+  float least_cosine;   // between the axis and what is in view
+  float behind = 0.1f;  // see typical_px(); of a box's half diagonal
 };
 
 /// Below this share of the wanted detail, an error is not worth a node's children. From there to

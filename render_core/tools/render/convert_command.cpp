@@ -190,7 +190,7 @@ void write_hints_beside(const SceneHints& hints, const Conversion& conversion,
   nlohmann::ordered_json page_fields = page_fields_in_sidecar(conversion.in.hints);
   Placement placement = conversion.edit.placement;
   if (!keeps_origin(conversion.options.out)) placement.offset -= done.origin;
-  if (placement.moves()) place_tours(page_fields, placement, written.origin);
+  if (placement.moves()) place_tours(page_fields, placement, written);
   write_sidecar(written, sidecar, &page_fields);
   fmt::print("{}: first view, {}{}\n", sidecar.string(), hints.source == "estimated" ? "" : "from ",
              hints.source);

@@ -201,7 +201,8 @@ void add_frames_command(CLI::App& app) {
       ->excludes(alpha)
       ->excludes(depth)
       ->excludes(command->get_option("--fov-deg"))
-      ->excludes(command->get_option("--focal-px"));
+      ->excludes(command->get_option("--focal-px"))
+      ->excludes(command->get_option("--orthographic"));
   command->get_option("--fps")->description(
       "Frames per second (default: 30 for a script, else the rate of the trace, of which a video "
       "gets 30 at most). The trace is resampled, but forecasts use its recorded samples only, and "

@@ -28,9 +28,15 @@ struct TraceOptions {
   std::string out;
 };
 
+/// Traces are judged by the motion that a perspective picture shows.
+void add_perspective_options(CLI::App& command, LensOptions& lens) {
+  add_lens_options(command, lens);
+  command.remove_option(command.get_option("--orthographic"));
+}
+
 void add_trace_options(CLI::App& command, TraceOptions& options) {
   add_scene_options(command, options.scene);
-  add_lens_options(command, options.lens);
+  add_perspective_options(command, options.lens);
   command.add_flag("--force", options.force,
                    "Write the trace even if it is unfit for measurements");
   command.add_option("--out", options.out, "TUM file to write")->required();
@@ -176,7 +182,7 @@ void add_check(CLI::App& trace) {
   CLI::App* command =
       trace.add_subcommand("check", "Checks whether a trace is fit for measurements");
   add_scene_options(*command, options->scene);
-  add_lens_options(*command, options->lens);
+  add_perspective_options(*command, options->lens);
   command->add_option("--trace", options->trace, fmt::format("Camera path: {}", camera_path_forms))
       ->required();
   command->callback([options, command] {

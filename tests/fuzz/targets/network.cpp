@@ -53,6 +53,8 @@ void require_sound(const PoseSample& sample) {
   require_place(pose.position);
   require(in(glm::length(pose.orientation), 0.999f, 1.001f), "orientations have length 1");
   require(in(sample.fov_y_rad, 0.1f, 2.8f), "fields of view are sane");
+  require(sample.view_height == 0.0f || in(sample.view_height, 1e-6f, max_coordinate),
+          "views have a height");
   require(in(sample.client_time_us, -max_time_us, max_time_us), "times are exact in a browser");
 }
 
@@ -96,9 +98,11 @@ void require_sound(const Pick& pick) {
   require(in(glm::length(pick.direction), 0.999f, 1.001f), "directions have length 1");
 }
 
-void require_sound(const ClipPlane& plane) {
-  require_place(plane.normal);
-  require(std::isfinite(plane.offset), "planes are somewhere");
+void require_sound(const ClipBox& box) {
+  for (int i = 0; i < 3; ++i) {
+    require_place(box.axes[i]);
+    require(box.low[i] <= box.high[i], "boxes are not empty");
+  }
 }
 void require_sound(const Ping& ping) { require_place(ping.place); }
 
@@ -178,6 +182,12 @@ std::map<std::string, std::string> client_message_seeds() {
   add("bye", [](auto& m) { m.mutable_bye(); });
   add("pick", [](auto& m) { m.mutable_pick()->mutable_direction()->set_z(2.0f); });
   add("clip", [](auto& m) { m.mutable_clip()->mutable_normal()->set_y(1.0f); });
+  add("clip_box", [](auto& m) {
+    auto& box = *m.mutable_clip()->mutable_box();
+    box.mutable_world_from_box()->mutable_orientation()->set_w(1.0f);
+    for (const auto set : {&v1::Vec3::set_x, &v1::Vec3::set_y, &v1::Vec3::set_z})
+      (box.mutable_half_extent()->*set)(2.0f);
+  });
   return seeds;
 }
 

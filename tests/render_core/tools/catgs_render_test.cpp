@@ -215,6 +215,12 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");
   expect(frames(still + "--near 0 --out x"), "--near: 0 is not a positive, finite distance");
   expect(frames(still + "--clip 0,0,0,1 --out x"), "--clip: has a normal of 0");
+  expect(frames(still + "--orthographic 0 --out x"), "--orthographic: the focal length");
+  expect(frames(still + "--orthographic 5 --fov-deg 60 --out x"),
+         "--fov-deg excludes --orthographic");
+  expect(frames(still + "--section 0,0,0,1,2 --out x"),
+         "--section: \"0,0,0,1,2\" is not 7 numbers");
+  expect(frames(still + "--section 0,0,0,1,0,1,0 --out x"), "--section: has a side that is not");
   expect(frames("--script tour: --out x"), "--script: tour: names no file");
   std::ofstream(path("tours.json")) << R"({"tours": []})";
   expect(frames("--script tour:" + path("tours.json") + " --out x"), "tours.json: is a sidecar");

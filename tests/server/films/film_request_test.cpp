@@ -27,6 +27,28 @@ TEST(FilmRequest, RepeatsViewsAndKeepsTheFieldOfView) {
   EXPECT_NEAR(request.views[4].fov_y_rad, 1.0471976f, 1e-6f);
 }
 
+TEST(FilmRequest, OrthographicViewsHaveANinthNumber) {
+  const auto views =
+      parse_film_request(film("[1, 2, 3, 0, 0, 0, 1, 60, 8.5], [4, 5, 6, 0, 0, 0, 1], " + view))
+          .views;
+  EXPECT_EQ(views[0].view_height, 8.5f);
+  EXPECT_EQ(views[1].view_height, 8.5f);
+  EXPECT_EQ(views[2].view_height, 0.0f);
+}
+
+TEST(FilmRequest, MayDrawOneBoxOnly) {
+  const auto boxed = [](const std::string& box) {
+    return fmt::format(R"({{"kind": "picture", "size": [320, 180], "views": [{}], "box": {}}})",
+                       view, box);
+  };
+  const auto box = parse_film_request(boxed("[1, 2, 3, 0, 0, 0, 1, 4, 5, 6]")).box;
+  ASSERT_TRUE(box);
+  EXPECT_EQ(box->centre, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(box->half_extent, glm::vec3(4, 5, 6));
+  for (const char* bad : {"[1, 2, 3]", "7", "[1, 2, 3, 0, 0, 0, 1, 4, 0, 6]"})
+    EXPECT_EQ(mistake(boxed(bad)), "box") << bad;
+}
+
 TEST(FilmRequest, LastsTenMinutesAtMost) {
   EXPECT_EQ(parse_film_request(film(view + ", 17999")).views.size(), most_film_frames);
   for (const char* frames : {", 18000", ", 4294967295"})
@@ -51,9 +73,9 @@ TEST(FilmRequest, NamesTheFieldThatIsWrong) {
   EXPECT_EQ(mistake("7"), "film");
   EXPECT_EQ(mistake(film(view, "[320, 180]", "opera")), "kind");
   EXPECT_EQ(mistake(film("")), "views");
-  for (const char* bad :
-       {"7", "[1, 2, 3, 0, 0, 0, 1]", "[1, 2, 3, 0, 0, 0, 0, 60]", "[1, 2, 3, 0, 0, 0, 1.02, 60]",
-        "[1, 2, 3, 0, 0, 0, 1, 170]", "[1, 2, 3e9, 0, 0, 0, 1, 60]"})
+  for (const char* bad : {"7", "[1, 2, 3, 0, 0, 0, 1]", "[1, 2, 3, 0, 0, 0, 0, 60]",
+                          "[1, 2, 3, 0, 0, 0, 1.02, 60]", "[1, 2, 3, 0, 0, 0, 1, 170]",
+                          "[1, 2, 3, 0, 0, 0, 1, 60, 0]", "[1, 2, 3e9, 0, 0, 0, 1, 60]"})
     EXPECT_EQ(mistake(film(bad)), "views[0]") << bad;
   EXPECT_EQ(mistake(film("[1, 2, \"x\", 0, 0, 0, 1, 60]")), "views[0][2]");
   for (const char* bad : {", 1.5", ", -1"}) EXPECT_EQ(mistake(film(view + bad)), "views[1]") << bad;

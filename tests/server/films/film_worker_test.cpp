@@ -33,7 +33,7 @@ class FilmWorker : public testing::Test {
     calls = 0;
     double last_share = 0.0;
     ResultFile file;
-    draw_film({kind, size_px, {view}}, take, file, [&](double share, Clock::duration) {
+    draw_film({kind, size_px, {view}, box}, take, file, [&](double share, Clock::duration) {
       EXPECT_GE(share, last_share);
       last_share = share;
       ++calls;
@@ -58,20 +58,31 @@ class FilmWorker : public testing::Test {
   const std::shared_ptr<SceneLeases> leases = std::make_shared<SceneLeases>();
   const FilmScene::Take take = [this] { return leased(scene, leases, 0); };
   FilmView view;
+  std::optional<FilmBox> box;
   int calls = 0;
 };
 
 TEST_F(FilmWorker, APictureInPartsIsThePicture) {
   const glm::ivec2 size_px{2200, 1100};
-  const Image picture = drawn(FilmKind::picture, size_px);
-  EXPECT_GE(calls, 6) << "after each part";
-  FrameRequest request;
-  request.camera = make_camera(view.pose_about({0, 0, 0}), size_px,
-                               focal_from_fov_y(view.fov_y_rad, size_px.y), 0.2f);
   const auto whole_view = scene.renderer->make_view({Pipeline::exact, PixelFormat::rgb_f32});
-  FrameView frame;
-  ASSERT_TRUE(whole_view->render(request, frame).ok());
-  EXPECT_GT(compare_images(copy_image(frame), picture).psnr(), 55.0);
+  for (const float view_height : {0.0f, 6.0f}) {
+    view.view_height = view_height;
+    if (view_height > 0.0f) box = FilmBox{{0, 0, 5}, {1, 0, 0, 0}, {1, 1, 2}};
+    const Image picture = drawn(FilmKind::picture, size_px);
+    EXPECT_GE(calls, 6) << "after each part";
+    FrameRequest request;
+    request.camera =
+        make_view_camera(view.pose_about({0, 0, 0}), size_px, view.fov_y_rad, view_height, 0.2f);
+    FrameView frame;
+    ASSERT_TRUE(whole_view->render(request, frame).ok());
+    const double psnr = compare_images(copy_image(frame), picture).psnr();
+    if (box) {
+      EXPECT_LT(psnr, 40.0) << "the box leaves something out";
+      request.camera.clip = oriented_box({0, 0, 5}, {1, 0, 0, 0}, {1, 1, 2});
+      ASSERT_TRUE(whole_view->render(request, frame).ok());
+    }
+    EXPECT_GT(compare_images(copy_image(frame), picture).psnr(), 55.0);
+  }
 }
 
 TEST_F(FilmWorker, APanoramaShowsAllAround) {

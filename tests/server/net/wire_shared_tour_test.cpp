@@ -1,4 +1,4 @@
-// Messages of shared tours, portals and clip planes.
+// Messages of shared tours, portals and clipping.
 
 #include "tests/server/net/wire_messages.h"
 #include "tests/support/test.h"
@@ -25,14 +25,45 @@ TEST(WireClip, IsAPlaneOfFiniteNumbers) {
   v1::ClientMessage message;
   message.mutable_clip()->mutable_normal()->set_y(2.0f);
   message.mutable_clip()->set_offset(-3.0f);
-  EXPECT_EQ(parsed<ClipPlane>(message), (ClipPlane{{0, 2, 0}, -3}));
+  EXPECT_EQ(parsed<ClipBox>(message), clip_plane({0, 2, 0}, -3));
   message.mutable_clip()->mutable_normal()->set_y(0.0f);
-  EXPECT_EQ(parsed<ClipPlane>(message), ClipPlane{}) << "without a normal, all are drawn";
+  EXPECT_EQ(parsed<ClipBox>(message), ClipBox{}) << "without a normal, all are drawn";
   message.mutable_clip()->mutable_normal()->set_x(std::numeric_limits<float>::quiet_NaN());
   EXPECT_EQ(wrong_field(message), "clip.normal.x");
   message.mutable_clip()->mutable_normal()->set_x(0.0f);
   message.mutable_clip()->set_offset(std::numeric_limits<float>::infinity());
   EXPECT_EQ(wrong_field(message), "clip.offset");
+}
+
+TEST(WireClip, BoxesHaveAPoseAndSides) {
+  v1::ClientMessage message;
+  auto& box = *message.mutable_clip()->mutable_box();
+  box.mutable_world_from_box()->mutable_position()->set_x(3.0f);
+  EXPECT_EQ(wrong_field(message), "clip.box.orientation");
+  box.mutable_world_from_box()->mutable_orientation()->set_w(1.0f);
+  for (const auto set : {&v1::Vec3::set_x, &v1::Vec3::set_y, &v1::Vec3::set_z})
+    (box.mutable_half_extent()->*set)(2.0f);
+  const ClipBox parsed_box = parsed<ClipBox>(message);
+  EXPECT_EQ(parsed_box, oriented_box({3, 0, 0}, {1, 0, 0, 0}, {2, 2, 2}));
+  EXPECT_EQ(parsed_box.low, glm::vec3(1, -2, -2));
+  for (const float bad : {0.0f, -1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
+    box.mutable_half_extent()->set_y(bad);
+    EXPECT_EQ(wrong_field(message), "clip.box.half_extent.y");
+  }
+}
+
+TEST(WirePose, ViewsOfParallelRaysHaveAHeight) {
+  v1::ClientMessage message;
+  auto& pose = *message.mutable_pose();
+  pose.set_fov_y_rad(1.0f);
+  pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
+  EXPECT_EQ(parsed<PoseSample>(message).view_height, 0.0f);
+  pose.set_view_height(12.0f);
+  EXPECT_EQ(parsed<PoseSample>(message).view_height, 12.0f);
+  for (const float bad : {-1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
+    pose.set_view_height(bad);
+    EXPECT_EQ(wrong_field(message), "pose.view_height");
+  }
 }
 
 TEST(WireSharedTour, ShownStopsAreThoseThatToursMayHave) {

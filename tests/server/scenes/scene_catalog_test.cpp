@@ -107,6 +107,7 @@ TEST_F(SceneCatalog, ReadsASceneFromATreeOfItsOwn) {
   const auto entry = load(1, {.tree = tree});
   EXPECT_TRUE(entry->in_pages);
   EXPECT_EQ(entry->facts.gaussians, 300u);
+  EXPECT_TRUE(glm::all(glm::lessThan(entry->facts.content_min, entry->facts.content_max)));
   EXPECT_EQ(entry->name, "plain");
   EXPECT_EQ(entry->sidecar, folder_ / "plain.json");
   write("plain.json", R"({"near": -1})");

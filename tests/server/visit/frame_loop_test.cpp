@@ -379,11 +379,11 @@ TEST_F(RestTest, JpegsGrowUntilTheyAreSharp) {
   EXPECT_FALSE(has_next());
 }
 
-TEST_F(FrameLoopTest, AnotherClipPlaneIsAnotherPicture) {
+TEST_F(FrameLoopTest, AnotherClipBoxIsAnotherPicture) {
   moved();
   rested();
   while (has_next()) rested();
-  const ClipPlane plane{{0, 1, 0}, 2};
+  const ClipBox plane = clip_plane({0, 1, 0}, 2);
   loop.clip(plane, now);
   now += 17ms;
   ASSERT_TRUE(is_due());
@@ -396,7 +396,25 @@ TEST_F(FrameLoopTest, AnotherClipPlaneIsAnotherPicture) {
   EXPECT_FALSE(has_next()) << "the same one";
   loop.enter_scene({});
   pose(++poses, 1.0f);
-  EXPECT_EQ(run().request.camera.clip, ClipPlane{});
+  EXPECT_EQ(run().request.camera.clip, ClipBox{});
+}
+
+TEST_F(FrameLoopTest, OrthographicPosesGiveOrthographicPictures) {
+  PoseSample plan = sample(1, 0.0f);
+  plan.view_height = 18.0f;
+  loop.pose_arrived(plan, now);
+  const FrameOrder order = run();
+  EXPECT_TRUE(order.request.camera.orthographic);
+  EXPECT_EQ(order.request.camera.focal_px.y, 360.0f / 18.0f);
+  EXPECT_EQ(order.ticket.view_height, 18.0f);
+  plan.pose_id = 2;
+  plan.view_height = 9.0f;
+  loop.pose_arrived(plan, now += 17ms);
+  EXPECT_TRUE(is_due()) << "another scale";
+  run();
+  loop.pose_arrived(sample(3, 0.0f), now += 17ms);
+  EXPECT_TRUE(is_due());
+  EXPECT_FALSE(run().request.camera.orthographic);
 }
 
 }  // namespace

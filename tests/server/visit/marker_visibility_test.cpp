@@ -24,8 +24,9 @@ class MarkerVisibilityTest : public testing::Test {
  protected:
   using Hidden = std::optional<std::vector<std::uint32_t>>;  // none: nothing new
 
-  Hidden look_from(const glm::vec3& position) {
+  Hidden look_from(const glm::vec3& position, float view_height = 0.0f) {
     PoseSample camera;
+    camera.view_height = view_height;
     camera.world_from_camera.position = position;
     const auto said = markers.test(surface, camera, clip, now += 250ms);
     EXPECT_EQ(said ? said->id : 7u, 7u);
@@ -35,7 +36,7 @@ class MarkerVisibilityTest : public testing::Test {
 
   const SurfacePoints surface = wall();
   TimePoint now = TimePoint{} + 1h;
-  ClipPlane clip;
+  ClipBox clip;
   MarkerVisibility markers;
 };
 
@@ -54,12 +55,20 @@ TEST_F(MarkerVisibilityTest, MarkersBehindAWallAreHiddenUntilTheCameraIsBeyondIt
 TEST_F(MarkerVisibilityTest, APlaneThatCutsTheWallOffUncoversMarkers) {
   markers.watch({7, {{0, 0, 5}}});
   EXPECT_EQ(look_from(in_front), indices({0}));
-  clip = {{0, 0, -2}, -8};  // draws what has z > 4
+  clip = clip_plane({0, 0, -2}, -8);  // draws what has z > 4
   EXPECT_EQ(look_from(in_front), indices({}));
-  clip = {{0, 0, -2}, -4};  // z > 2: the wall is drawn
+  clip = clip_plane({0, 0, -2}, -4);  // z > 2: the wall is drawn
   EXPECT_EQ(look_from(in_front), indices({0}));
-  clip = {{0, 0, 2}, 12};  // z < 6: the camera and the wall are drawn
+  clip = clip_plane({0, 0, 2}, 12);  // z < 6: the camera and the wall are drawn
   EXPECT_FALSE(look_from(in_front));
+  clip = oriented_box({0, 0, 2}, {1, 0, 0, 0}, {1, 1, 0.5f});  // before the wall
+  EXPECT_EQ(look_from(in_front), indices({}));
+}
+
+TEST_F(MarkerVisibilityTest, ParallelRaysMeetWhatIsInFrontOfEachMarker) {
+  markers.watch({7, {{1.5f, 0, 9}, {5, 0, 9}}});
+  EXPECT_EQ(look_from(in_front), indices({0, 1})) << "rays to one point pass through the wall";
+  EXPECT_EQ(look_from(in_front, 8.0f), indices({0})) << "the second one is beside the wall";
 }
 
 TEST_F(MarkerVisibilityTest, RaysAreLimitedWhateverTheClientSends) {

@@ -41,7 +41,15 @@ TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
   EXPECT_EQ(picked->distance, 3.0f);
   session.on_message(Pick{6, glm::vec3(0.0f), {0.0f, 0.0f, -1.0f}}, now);
   EXPECT_FALSE(std::get<Picked>(host.said.back()).distance);
-  for (std::uint32_t id = 7; id < 100; ++id)
+  const auto distance_in = [&](const ClipBox& box) {
+    session.on_message(box, now);
+    session.on_message(Pick{7, {}, {0.0f, 0.0f, 1.0f}}, now);
+    return std::get<Picked>(host.said.back()).distance;
+  };
+  EXPECT_EQ(distance_in(oriented_box({0, 0, 4}, {1, 0, 0, 0}, {1, 1, 2})), 3.0f);
+  EXPECT_FALSE(distance_in(oriented_box({0, 0, 1}, {1, 0, 0, 0}, {1, 1, 1}))) << "behind the box";
+  EXPECT_FALSE(distance_in(oriented_box({5, 0, 3}, {1, 0, 0, 0}, {1, 1, 1}))) << "beside the box";
+  for (std::uint32_t id = 10; id < 100; ++id)
     session.on_message(Pick{id, {}, {0.0f, 0.0f, 1.0f}}, now);
   EXPECT_EQ(host.count<Picked>(), 32);
   now += 32ms;

@@ -1,5 +1,6 @@
 // Pictures and films for authors. It loads when an author opens it.
 import type { Eye } from '../camera/eye';
+import { clip_box } from '../camera/upright_box';
 import {
   cancel_film,
   film_address,
@@ -17,14 +18,13 @@ import {
   write_views,
 } from '../film/path';
 import { make, save_file } from '../page/dom';
-import type { Navigation } from '../page/navigation';
+import type { PageParts } from '../page/parts';
 import { file_name_of } from '../session/scenes';
 import { duration, number } from '../text/number';
 import { text } from '../text/text';
 import type { Tour } from '../tour/tour';
 
-export interface FilmTools {
-  readonly navigation: Navigation;
+export interface FilmTools extends Pick<PageParts, 'navigation' | 'clipping'> {
   /** The tour that is edited. */
   tour(): Tour;
   /** Lets its holder order; undefined: this visitor may not. */
@@ -128,20 +128,33 @@ export class FilmPanel {
     return undefined;
   }
 
+  /** The visitor's section box. */
+  private box(): number[] | undefined {
+    const { clipping, navigation } = this.tools_;
+    if (!clipping.section) return undefined;
+    const { world_from_box, half_extent } = clip_box(
+      clipping.section,
+      navigation.camera.up,
+      undefined,
+    );
+    return [...world_from_box.position, ...world_from_box.orientation, ...half_extent];
+  }
+
   private save_path(): void {
     const eyes = this.eyes();
     if (!eyes) return;
     const file = `${file_name_of(this.tools_.navigation.scene_id)}.tum`;
     save_file(new Blob([write_tum(eyes)], { type: 'text/plain' }), file);
-    const fov_deg = ((eyes[0]?.fov_y_rad ?? 1) * 180) / Math.PI;
+    const { fov_y_rad, view_height } = eyes[0] ?? { fov_y_rad: 1 };
     const command = [
       'catgs-render',
       'frames',
       '…',
       '--trace',
       file,
-      '--fov-deg',
-      fov_deg.toFixed(1),
+      ...(view_height
+        ? ['--orthographic', view_height.toPrecision(6)]
+        : ['--fov-deg', ((fov_y_rad * 180) / Math.PI).toFixed(1)]),
       '--out',
       'film.mp4',
     ];
@@ -162,6 +175,7 @@ export class FilmPanel {
       kind,
       size,
       views: write_views(eyes),
+      box: kind === 'film' ? undefined : this.box(),
     });
     if ('id' in ordered) await this.watch(ordered.id, name);
     else this.say(words.failed({ why: ordered.why || text.author.unreachable }));

@@ -1,7 +1,7 @@
 import { load_part } from '../base/load_part';
 import type { Eye } from '../camera/eye';
 import { by_id, on_click, save_file } from '../page/dom';
-import type { Navigation } from '../page/navigation';
+import type { PageParts } from '../page/parts';
 import { file_name_of, type SceneListing } from '../session/scenes';
 import { text } from '../text/text';
 import { texts_written } from '../text/translations';
@@ -19,8 +19,7 @@ import { AuthorLanguage } from './language';
 import type { Preview } from './preview';
 import { AuthorStops, type MediaFields, type StopActions } from './stops';
 
-interface AuthorTools {
-  readonly navigation: Navigation;
+interface AuthorTools extends Pick<PageParts, 'navigation' | 'clipping'> {
   readonly player: TourPlayer;
   readonly preview: Preview;
   /** The scenes that this author may see. */
@@ -215,6 +214,7 @@ export class AuthorPanel {
     if (this.film_) return this.film_.look();
     this.film_ = new FilmPanel(fields, {
       navigation: this.tools_.navigation,
+      clipping: this.tools_.clipping,
       tour: () => this.draft_.tour,
       token: () => this.token_,
     });
@@ -226,7 +226,7 @@ export class AuthorPanel {
   }
 
   /** The point in the middle of the view. Saves wait for the edit that asks for it. */
-  private point_ahead(): ReturnType<Navigation['point_ahead']> {
+  private point_ahead(): ReturnType<PageParts['navigation']['point_ahead']> {
     const point = this.tools_.navigation.point_ahead();
     const known = point.catch(() => undefined);
     this.points_ = this.points_.then(() => known);
@@ -234,7 +234,8 @@ export class AuthorPanel {
   }
 
   private async add(): Promise<void> {
-    const eye = this.tools_.navigation.eye;
+    const { eye } = this.tools_.navigation;
+    const { section } = this.tools_.clipping;
     const { edited } = this.draft_.state;
     const { scene_id_: scene_id } = this;
     const marker = await this.point_ahead();
@@ -246,6 +247,7 @@ export class AuthorPanel {
       caption: '',
       ...untranslated,
       eye,
+      section,
       marker,
       stay_s: undefined,
       fly_s: undefined,
@@ -259,12 +261,13 @@ export class AuthorPanel {
   }
 
   private async take_view(index: number): Promise<void> {
-    const eye = this.tools_.navigation.eye;
+    const { eye } = this.tools_.navigation;
+    const { section } = this.tools_.clipping;
     const stop = this.draft_.stops[index];
     const marker = await this.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop); // it may have moved meanwhile
     if (at < 0) return;
-    this.draft_.change(at, { eye, marker });
+    this.draft_.change(at, { eye, section, marker });
     this.edited();
   }
 

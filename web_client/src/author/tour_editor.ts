@@ -24,19 +24,20 @@ export class TourEditor {
 
   /** `scenes`: those that this author may see. */
   constructor(
-    private readonly parts_: Pick<PageParts, 'navigation' | 'toolbar'>,
+    private readonly parts_: Pick<PageParts, 'navigation' | 'clipping' | 'toolbar'>,
     tours: TourStage,
     measures: MeasureList,
     scenes: () => Promise<readonly SceneListing[]>,
     media: MediaFields,
   ) {
-    const { navigation, toolbar } = parts_;
+    const { navigation, clipping, toolbar } = parts_;
     const { camera } = navigation;
     const { player } = tours;
-    const preview = new Preview(player, toolbar, navigation);
+    const preview = new Preview(player, toolbar, navigation, clipping);
     navigation.taken_over.listen(() => preview.forget());
     this.panel_ = new AuthorPanel({
       navigation,
+      clipping,
       player,
       preview,
       scenes,

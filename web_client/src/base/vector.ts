@@ -85,7 +85,7 @@ export function slerp(a: Quat, b: Quat, share: number): Quat {
 }
 
 /** The rotation whose axes are these orthonormal vectors. */
-function from_axes(x: Vec3, y: Vec3, z: Vec3): Quat {
+export function from_axes(x: Vec3, y: Vec3, z: Vec3): Quat {
   const trace = x[0] + y[1] + z[2];
   if (trace > 0) {
     return unit([y[2] - z[1], z[0] - x[2], x[1] - y[0], trace + 1]);

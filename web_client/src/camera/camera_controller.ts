@@ -20,6 +20,7 @@ import { FlyController } from './fly_controller';
 import type { CameraMode, ModeController } from './mode';
 import { is_held, no_axes, type Axes, type Gesture } from './movement';
 import { OrbitController } from './orbit_controller';
+import type { OrthographicController } from './orthographic_controller';
 import type { SceneSetup } from './scene_setup';
 import { Smoothing } from './smoothing';
 import { WalkController } from './walk_controller';
@@ -40,11 +41,14 @@ export class CameraController {
     fly: new FlyController(this.rig_),
     walk: this.walk_,
   };
+  /** Of orthographic views; it loads when there is one. */
+  private orthographic_: OrthographicController | undefined;
   private readonly smoothing_ = new Smoothing();
   private mode_: CameraMode = 'orbit';
   private scene_: SceneSetup | undefined;
   private speed_ = 1;
   private settled_ = true;
+  private before_: Eye | undefined; // the orthographic view
   private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
   /** Time constant of the glide after a gesture. 0 turns it off, for people who asked for reduced motion. */
@@ -57,7 +61,23 @@ export class CameraController {
   }
 
   get eye(): Eye {
-    return { ...this.rig_.pose, fov_y_rad: this.rig_.fov_y_rad };
+    const { pose, fov_y_rad, view_height } = this.rig_;
+    return { ...pose, fov_y_rad, view_height };
+  }
+
+  /** Whether rays are parallel. Flights and jumps change it. */
+  get is_orthographic(): boolean {
+    return this.rig_.view_height !== undefined;
+  }
+
+  /** Orthographic views can be moved from now on. */
+  load_orthographic(make: (rig: CameraRig) => OrthographicController): void {
+    this.orthographic_ ??= make(this.rig_);
+  }
+
+  /** Back to where the camera was before an orthographic view. */
+  leave_orthographic(): void {
+    if (this.is_orthographic) this.jump(this.before_ ?? this.start ?? this.pose);
   }
 
   /** The scene's scale to a visitor, world units. */
@@ -170,9 +190,9 @@ export class CameraController {
   }
 
   /** Puts the camera somewhere. The caller answers for the limits. */
-  jump(pose: Pose): void {
+  jump(to: Pose & Partial<Eye>): void {
     this.end_flight(false);
-    this.rig_.pose = { position: pose.position, orientation: unit(pose.orientation) };
+    this.see({ ...to, orientation: unit(to.orientation) });
     this.smoothing_.clear();
     this.rig_.refocus();
   }
@@ -186,6 +206,7 @@ export class CameraController {
   }
 
   set_mode(mode: CameraMode, at_once = false): void {
+    this.leave_orthographic();
     if (mode === this.mode_) return;
     this.mode_ = mode;
     const to = this.controller.begin();
@@ -235,6 +256,7 @@ export class CameraController {
 
   gesture(gesture: Gesture): void {
     this.end_flight(false);
+    if (this.is_orthographic) return this.smoothing_.ask(this.orthographic_?.asks(gesture) ?? {});
     switch (gesture.kind) {
       case 'look': {
         const { drag_rad } = this.controller;
@@ -259,7 +281,7 @@ export class CameraController {
 
   /** Moves by `dt_s`. Returns whether the camera moved. */
   step(dt_s: number, axes: Axes = no_axes): boolean {
-    const before = this.pose;
+    const { pose: before, view_height } = this.rig_;
     if (this.flight_ && !is_held(axes)) return this.follow_flight(dt_s);
     this.end_flight(false);
     this.hold(dt_s, axes);
@@ -269,11 +291,11 @@ export class CameraController {
     this.controller.move(rotate(this.pose.orientation, due.pan), due.climb);
     if (due.dolly !== 0) this.controller.dolly(due.dolly);
     this.settled_ = this.controller.settle?.(dt_s) ?? true;
-    return before !== this.pose;
+    return before !== this.pose || view_height !== this.rig_.view_height;
   }
 
   private get controller(): ModeController {
-    return this.modes_[this.mode_];
+    return (this.is_orthographic && this.orthographic_) || this.modes_[this.mode_];
   }
 
   private look_from(to: Eye, at_once: boolean): void {
@@ -298,11 +320,16 @@ export class CameraController {
     const flight = this.flight_;
     if (!flight) return false;
     flight.time_s = Math.min(flight.time_s + dt_s, flight.way.duration_s);
-    const { fov_y_rad, ...pose } = flight.way.at(flight.time_s);
-    this.rig_.pose = pose;
-    this.fov_y_rad = fov_y_rad;
+    this.see(flight.way.at(flight.time_s));
     if (flight.time_s >= flight.way.duration_s) this.end_flight(true);
     return true;
+  }
+
+  private see({ position, orientation, fov_y_rad, view_height }: Pose & Partial<Eye>): void {
+    if (view_height && !this.is_orthographic) this.before_ = this.eye;
+    this.rig_.pose = { position, orientation };
+    this.rig_.view_height = view_height;
+    if (fov_y_rad) this.fov_y_rad = fov_y_rad;
   }
 
   private end_flight(arrived: boolean): void {
@@ -315,6 +342,8 @@ export class CameraController {
 
   private hold(dt_s: number, axes: Axes): void {
     if (!is_held(axes)) return;
+    if (this.is_orthographic)
+      return this.smoothing_.ask(this.orthographic_?.held(axes, dt_s * this.speed) ?? {});
     const { speed, drag_rad, heading } = this.controller;
     const way = this.reach * this.speed * speed * (axes.fast ? fast_factor : 1) * dt_s;
     const turn = turn_rad_per_s * dt_s * Math.sign(drag_rad);

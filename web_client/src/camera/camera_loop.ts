@@ -65,7 +65,7 @@ export class CameraLoop {
     this.newest_ = {
       pose_id: this.pose_id_,
       time_us: this.clock_.now_us(),
-      eye: { ...this.camera_.pose, fov_y_rad: this.camera_.fov_y_rad },
+      eye: this.camera_.eye,
       distance: this.camera_.sight_distance,
     };
     this.send_(this.newest_);

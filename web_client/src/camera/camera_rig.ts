@@ -38,6 +38,8 @@ export class CameraRig {
   unlimited = false;
   /** Visits begin inside. */
   enclosed = false;
+  /** Of an orthographic view, world units; undefined: perspective. */
+  view_height: number | undefined;
   private fov_y_rad_ = default_fov_y_rad;
   private min_: Vec3 = [0, 0, 0];
   private max_: Vec3 = [0, 0, 0];
@@ -59,6 +61,7 @@ export class CameraRig {
     this.up = normalize(scene.up, [0, -1, 0]);
     const start = scene.start_pose;
     this.pose = { position: start.position, orientation: unit(start.orientation) };
+    this.view_height = undefined;
     this.fov_y_rad = scene.start_fov_y_rad ?? this.fov_y_rad_;
     this.focus = scene.focus;
     this.nearest = Math.max(scene.near_z, 1e-3) * 1.5;

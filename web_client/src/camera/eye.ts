@@ -7,16 +7,33 @@ export interface Pose {
   readonly orientation: Quat; // camera to world
 }
 
-/** A pinhole camera. */
+/** A camera. */
 export interface Eye extends Pose {
   readonly fov_y_rad: number;
+  /** Of an orthographic view, whose rays are parallel to its axis. World units; undefined: perspective. */
+  readonly view_height?: number | undefined;
 }
+
+/** Half of the view's height at depth 1; at any depth where rays are parallel. World units. */
+export const half_height = ({ fov_y_rad, view_height }: Eye): number =>
+  view_height === undefined ? Math.tan(fov_y_rad / 2) : view_height / 2;
+
+export const same_projection = (a: Eye, b: Eye): boolean =>
+  (a.view_height === undefined) === (b.view_height === undefined);
 
 /** Leaves out Gaussians whose centre c has dot(normal, c) > offset. World axes and units. */
 export interface ClipPlane {
   readonly normal: Vec3;
   readonly offset: number;
 }
+
+/** Leaves out Gaussians with their centre outside of a box. */
+export interface ClipBox {
+  readonly world_from_box: Pose;
+  readonly half_extent: Vec3;
+}
+
+export type Clip = ClipPlane | ClipBox;
 
 /** This page's camera at one time. */
 export interface CameraSample {
@@ -34,3 +51,14 @@ const fov_range_rad = [0.1, 2.8] as const;
 
 export const limited_fov = (fov_y_rad: number): number =>
   Math.min(fov_range_rad[1], Math.max(fov_range_rad[0], fov_y_rad));
+
+/** Field of view whose image plane is `factor` times as large, limited to the range of the wire. */
+export const widened_fov = (fov_y_rad: number, factor: number): number =>
+  limited_fov(2 * Math.atan(Math.tan(fov_y_rad / 2) * factor));
+
+/** The eye with a view `factor` times as high. */
+export const widened = (eye: Eye, factor: number): Eye => ({
+  ...eye,
+  fov_y_rad: widened_fov(eye.fov_y_rad, factor),
+  view_height: eye.view_height && eye.view_height * factor,
+});

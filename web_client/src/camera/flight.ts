@@ -1,6 +1,6 @@
 // Camera movements that are known in advance. Pure.
 import { add, angle_between, length, scale, slerp, sub } from '../base/vector';
-import type { Eye } from './eye';
+import { same_projection, type Eye } from './eye';
 
 export interface Flight {
   readonly duration_s: number;
@@ -44,9 +44,15 @@ export const between = (from: Eye, to: Eye, share: number): Eye => ({
   position: add(from.position, scale(sub(to.position, from.position), share)),
   orientation: slerp(from.orientation, to.orientation, share),
   fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
+  view_height:
+    from.view_height && to.view_height
+      ? from.view_height * (to.view_height / from.view_height) ** share
+      : to.view_height,
 });
 
-export function glide(from: Eye, to: Eye, duration_s: number): Flight {
+/** At once where perspective becomes orthographic, or back: nothing lies between. */
+export function glide(from: Eye, to: Eye, wanted_s: number): Flight {
+  const duration_s = same_projection(from, to) ? wanted_s : 0;
   return {
     duration_s,
     at: (time_s) => between(from, to, duration_s > 0 ? eased(time_s / duration_s) : 1),

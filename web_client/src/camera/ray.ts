@@ -12,7 +12,7 @@ import {
   sub,
   type Vec3,
 } from '../base/vector';
-import type { Eye } from './eye';
+import { half_height, type Eye } from './eye';
 
 export interface Ray {
   readonly origin: Vec3;
@@ -21,9 +21,12 @@ export interface Ray {
 
 /** Ray through a point of the view. `x`, `y`: shares of its width and height, y down. */
 export function ray_through(eye: Eye, x: number, y: number, aspect: number): Ray {
-  const tan = Math.tan(eye.fov_y_rad / 2);
-  const inside = normalize([(2 * x - 1) * tan * aspect, (2 * y - 1) * tan, 1], forward);
-  return { origin: eye.position, direction: rotate(eye.orientation, inside) };
+  const half = half_height(eye);
+  const [right, down] = [(2 * x - 1) * half * aspect, (2 * y - 1) * half];
+  const turned = (v: Vec3): Vec3 => rotate(eye.orientation, v);
+  if (eye.view_height !== undefined)
+    return { origin: add(eye.position, turned([right, down, 0])), direction: turned(forward) };
+  return { origin: eye.position, direction: turned(normalize([right, down, 1], forward)) };
 }
 
 /** Place of a point of the scene in the view, as in ray_through(); undefined behind the camera. */
@@ -34,16 +37,16 @@ export function project(
 ): readonly [number, number] | undefined {
   const [x, y, z] = rotate(conjugate(eye.orientation), sub(point, eye.position));
   if (z <= 1e-6) return undefined;
-  const tan = Math.tan(eye.fov_y_rad / 2);
-  return [0.5 + x / z / tan / aspect / 2, 0.5 + y / z / tan / 2];
+  const half = half_height(eye) * (eye.view_height === undefined ? z : 1);
+  return [0.5 + x / half / aspect / 2, 0.5 + y / half / 2];
 }
 
 /** Side of a pixel at a point of the scene, where the view has so many rows. */
-export const pixel_at = (point: Vec3, eye: Eye, height_px: number): number =>
-  (2 *
-    Math.tan(eye.fov_y_rad / 2) *
-    dot(sub(point, eye.position), rotate(eye.orientation, forward))) /
-  Math.max(1, height_px);
+export function pixel_at(point: Vec3, eye: Eye, height_px: number): number {
+  const depth = dot(sub(point, eye.position), rotate(eye.orientation, forward));
+  const half = half_height(eye) * (eye.view_height === undefined ? depth : 1);
+  return (2 * half) / Math.max(1, height_px);
+}
 
 type ViewPoint = readonly [x: number, y: number];
 

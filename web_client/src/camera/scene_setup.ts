@@ -10,6 +10,8 @@ export interface SceneSetup {
   readonly focus: Vec3;
   readonly limits_min: Vec3;
   readonly limits_max: Vec3;
+  /** Where nearly all that is drawn lies; undefined: not known. */
+  readonly content?: { readonly min: Vec3; readonly max: Vec3 } | undefined;
   readonly near_z: number;
   /** To a visitor; 0: unknown, and judged by the start. */
   readonly scale: number;

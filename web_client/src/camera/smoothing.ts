@@ -1,7 +1,7 @@
 import { add, length, scale, type Vec3 } from '../base/vector';
 
 /** What visitors ask of a camera, in any mode. */
-interface Movement {
+export interface Movement {
   readonly yaw: number; // rad about up; > 0 turns left
   readonly pitch: number; // rad about the camera's x axis; > 0 looks up
   readonly pan: Vec3; // world units along camera axes

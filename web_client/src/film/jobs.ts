@@ -5,6 +5,8 @@ export interface FilmRequest {
   readonly kind: 'picture' | 'panorama' | 'film';
   readonly size: readonly [number, number];
   readonly views: readonly (readonly number[] | number)[];
+  /** What is drawn: x, y, z, a quaternion, and half of the sides; undefined: all. */
+  readonly box?: readonly number[] | undefined;
 }
 
 /** How the file's name ends, after that of the scene. A picture and a panorama of a scene may lie in one folder. */

@@ -37,11 +37,12 @@ export function film_eyes(tour: Tour, reach: number): readonly Eye[] {
 export function write_views(eyes: readonly Eye[]): (readonly number[] | number)[] {
   const views: (readonly number[] | number)[] = [];
   let last = '';
-  for (const { position, orientation, fov_y_rad } of eyes) {
+  for (const { position, orientation, fov_y_rad, view_height } of eyes) {
     const view = [
       ...position.map((v) => short_coordinate(v, 7)),
       ...orientation.map((v) => Number(v.toFixed(6))),
       Number(((fov_y_rad * 180) / Math.PI).toFixed(3)),
+      ...(view_height ? [short_coordinate(view_height, 7)] : []),
     ];
     const written = view.join(' ');
     const before = views[views.length - 1];

@@ -115,7 +115,8 @@ export class Navigation {
 
   /** Puts the camera there, or as near as the scene's limits allow. Returns whether it is there. */
   put(eye: Eye): boolean {
-    const position = this.camera.within(eye.position);
+    const is_plan = eye.view_height !== undefined; // seen from outside
+    const position = is_plan ? eye.position : this.camera.within(eye.position);
     this.put_back({ ...eye, position });
     return same(position, eye.position);
   }
@@ -124,7 +125,12 @@ export class Navigation {
   put_back(eye: Eye): void {
     this.led_away.emit();
     this.camera.jump(eye);
-    this.camera.fov_y_rad = eye.fov_y_rad;
+    this.moved();
+  }
+
+  /** Back to where the camera was before an orthographic view. */
+  leave_orthographic(): void {
+    this.camera.leave_orthographic();
     this.moved();
   }
 
@@ -207,6 +213,7 @@ export class Navigation {
 
   set_mode(mode: CameraMode): void {
     this.default_mode_ = 'no';
+    if (this.camera.is_orthographic) this.loop.changed();
     this.camera.set_mode(mode, this.reduced_motion_);
     this.loop.wake();
     this.changed.emit();
@@ -262,7 +269,8 @@ export class Navigation {
     const { keys, pointers } = bind_view_input(this.view_, this.inertia_, this.gate_, {
       gesture: (gesture) => this.gesture(gesture),
       wheeled: (steps, is_pinch) => {
-        if (this.camera.mode === 'fly' && !is_pinch) this.faster(steps);
+        const flies = this.camera.mode === 'fly' && !this.camera.is_orthographic;
+        if (flies && !is_pinch) this.faster(steps);
         else this.gesture({ kind: 'dolly', steps });
       },
       keys_changed: () => this.take_over(),
@@ -271,7 +279,8 @@ export class Navigation {
       pointed: (pointed) => this.gestures.route(pointed),
     });
     this.gestures.set('look', ({ x, y, how }) => {
-      const looks = how === 'double tap' || (how === 'touch' && this.camera.mode === 'walk');
+      const walks = this.camera.mode === 'walk' && !this.camera.is_orthographic;
+      const looks = how === 'double tap' || (how === 'touch' && walks);
       if (looks) void this.look_at(x, y);
       return looks;
     });

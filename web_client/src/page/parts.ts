@@ -5,6 +5,7 @@ import { ScrollGate } from '../input/scroll_gate';
 import type { AccessToken } from '../session/token';
 import { text } from '../text/text';
 import { WorkerClient } from '../worker/client';
+import { Clipping } from './clipping';
 import { by_id } from './dom';
 import { Navigation } from './navigation';
 import { Notice } from './notice';
@@ -16,6 +17,7 @@ export interface PageParts {
   readonly clock: Clock;
   readonly worker: WorkerClient;
   readonly navigation: Navigation;
+  readonly clipping: Clipping;
   readonly seen: SeenCamera;
   readonly toolbar: Toolbar;
   readonly notice: Notice;
@@ -34,8 +36,21 @@ export function make_page_parts(token: AccessToken): PageParts {
   gate.refused.listen(() => notice.show(text.page.click_first, 2));
   gate.opened.listen(() => notice.withdraw(text.page.click_first));
   const navigation = new Navigation(view, worker, clock, reduced_motion, gate);
+  const clipping = new Clipping(worker, navigation);
   const toolbar = new Toolbar(navigation);
   const seen = new SeenCamera(worker, navigation, view);
   const storage = browser_storage('localStorage');
-  return { view, clock, worker, navigation, seen, toolbar, notice, token, storage, reduced_motion };
+  return {
+    view,
+    clock,
+    worker,
+    navigation,
+    clipping,
+    seen,
+    toolbar,
+    notice,
+    token,
+    storage,
+    reduced_motion,
+  };
 }

@@ -1,5 +1,5 @@
 import { Signal } from '../base/signal';
-import type { Eye } from '../camera/eye';
+import { widened, type Eye } from '../camera/eye';
 import type { WorkerClient } from '../worker/client';
 import type { Navigation } from './navigation';
 
@@ -27,9 +27,9 @@ export class SeenCamera {
     worker.on('config', ({ config: { widthPx, heightPx } }) => {
       this.picture_aspect_ = widthPx / Math.max(1, heightPx);
     });
-    worker.on('presented', ({ pose, fov_y_rad }) => {
-      if (this.watches_) this.moved.emit(this.all_in_view({ ...pose, fov_y_rad }));
-      else if (!this.warps_ || !this.has_picture_) this.moved.emit({ ...pose, fov_y_rad });
+    worker.on('presented', ({ eye }) => {
+      if (this.watches_) this.moved.emit(this.all_in_view(eye));
+      else if (!this.warps_ || !this.has_picture_) this.moved.emit(eye);
       this.has_picture_ = true;
     });
     navigation.sampled.listen(({ eye }) => {
@@ -41,6 +41,6 @@ export class SeenCamera {
   private all_in_view(eye: Eye): Eye {
     const { clientWidth, clientHeight } = this.view_;
     const taller = Math.max(1, (this.picture_aspect_ * clientHeight) / Math.max(1, clientWidth));
-    return { ...eye, fov_y_rad: 2 * Math.atan(Math.tan(eye.fov_y_rad / 2) * taller) };
+    return widened(eye, taller);
   }
 }

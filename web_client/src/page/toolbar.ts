@@ -5,7 +5,7 @@ import { text } from '../text/text';
 import { by_id, hint_at_more, on_click } from './dom';
 import type { Navigation } from './navigation';
 
-const panels = ['quality', 'stats', 'measure', 'plan', 'share', 'author', 'help'] as const;
+const panels = ['quality', 'stats', 'measure', 'plan', 'views', 'share', 'author', 'help'] as const;
 type Panel = (typeof panels)[number];
 
 // Screens on which one panel covers most of the picture.

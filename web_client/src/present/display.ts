@@ -1,10 +1,10 @@
 // Shows the newest picture on the canvas as this page's newest camera sees it, at the rate of the
 // display.
-import type { CameraSample, Eye } from '../camera/eye';
+import { half_height, type CameraSample, type Eye } from '../camera/eye';
 import type { Picture } from '../decode/picture';
 import type { Pixels, Placing, Presenter } from './presenter';
 import { TurnForecast } from './turn_forecast';
-import { reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
+import { can_show, reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
 import { WarpPolicy, type WarpMode, type WarpState } from './warp_policy';
 
 interface DisplayEnvironment {
@@ -129,6 +129,7 @@ export class Display {
   private placing(): Placing | undefined {
     const { picture_: picture, camera_: camera } = this;
     if (!picture || !camera || !this.policy_.active) return undefined;
+    if (!can_show(picture.eye, camera.eye)) return undefined;
     const matrix = this.matrix(picture, camera.eye, camera.distance);
     // After a jump the view sees almost nothing of the picture, which is then better left as it is.
     const { x, y } = reach(matrix);
@@ -147,7 +148,7 @@ export class Display {
     if (!picture || !view) return;
     const now_us = this.env_.now_us();
     this.turn_.drawn(picture.eye.orientation, now_us);
-    const tall = Math.tan(picture.eye.fov_y_rad / 2) / Math.tan(view.fov_y_rad / 2);
+    const tall = half_height(picture.eye) / half_height(view);
     const wide = (tall * picture.width_px) / picture.height_px / this.aspect;
     const shown = reach(matrix);
     let needed = { x: shown.x * wide, y: shown.y * tall };

@@ -1,7 +1,7 @@
 // Warps a picture to a camera that has moved since the picture was rendered. tests/load/warp.cpp repeats
 // it for benchmarks. Pure.
-import { conjugate, multiply, rotate, scale, sub, type Vec3 } from '../base/vector';
-import { limited_fov, type Eye } from '../camera/eye';
+import { angle_between, conjugate, multiply, rotate, scale, sub, type Vec3 } from '../base/vector';
+import { half_height, same_projection, type Eye } from '../camera/eye';
 
 /** Column-major, for homogeneous coordinates (x, y, 1); x and y are -1…1 across an image, y down. */
 export type Matrix3 = Float32Array;
@@ -9,7 +9,8 @@ export type Matrix3 = Float32Array;
 /**
  * Homography from points of the view to points of the picture. It is exact for the plane at `distance`
  * ahead of the view, at a right angle to its axis. With Infinity it is exact for the far field, where
- * only rotation counts. `aspect`: width over height of the picture, and of the view where that differs.
+ * only rotation counts. Between orthographic views of one direction it is exact for all. `aspect`: width
+ * over height of the picture, and of the view where that differs.
  */
 export function warp_matrix(
   picture: Eye,
@@ -20,24 +21,33 @@ export function warp_matrix(
 ): Matrix3 {
   const to_picture = conjugate(picture.orientation);
   const turn = multiply(to_picture, view.orientation);
-  const shift = scale(rotate(to_picture, sub(view.position, picture.position)), 1 / distance);
-  const from_tan = Math.tan(view.fov_y_rad / 2);
-  const to_tan = Math.tan(picture.fov_y_rad / 2);
+  const is_parallel = view.view_height !== undefined;
+  const way = rotate(to_picture, sub(view.position, picture.position));
+  const shift = scale(way, is_parallel ? 1 : 1 / distance);
+  const [from_half, to_half] = [half_height(view), half_height(picture)];
   const column = (axis: Vec3, length: number, add: Vec3): number[] => {
     const [x, y, z] = rotate(turn, axis);
     return [
-      ((x * length + add[0]) / to_tan) * (1 / aspect),
-      (y * length + add[1]) / to_tan,
-      z * length + add[2],
+      ((x * length + add[0]) / to_half) * (1 / aspect),
+      (y * length + add[1]) / to_half,
+      is_parallel ? axis[2] : z * length + add[2],
     ];
   };
   const none: Vec3 = [0, 0, 0];
   return new Float32Array([
-    ...column([1, 0, 0], from_tan * view_aspect, none),
-    ...column([0, 1, 0], from_tan, none),
-    ...column([0, 0, 1], 1, shift),
+    ...column([1, 0, 0], from_half * view_aspect, none),
+    ...column([0, 1, 0], from_half, none),
+    ...column([0, 0, 1], is_parallel ? 0 : 1, shift),
   ]);
 }
+
+const same_direction_rad = 1e-3;
+
+/** Whether a warp shows the view: orthographic pictures show one direction only. */
+export const can_show = (picture: Eye, view: Eye): boolean =>
+  same_projection(picture, view) &&
+  (view.view_height === undefined ||
+    angle_between(picture.orientation, view.orientation) < same_direction_rad);
 
 /** Point of the picture of a point of the view; undefined behind the picture's camera. */
 export function warped(m: Matrix3, x: number, y: number): readonly [number, number] | undefined {
@@ -84,9 +94,4 @@ export function uncovered_share(m: Matrix3, columns = 64, rows = 36): number {
     }
   }
   return uncovered / (columns * rows);
-}
-
-/** Field of view whose image plane is `factor` times as large, limited to the range of the wire. */
-export function widened_fov(fov_y_rad: number, factor: number): number {
-  return limited_fov(2 * Math.atan(Math.tan(fov_y_rad / 2) * factor));
 }

@@ -1,10 +1,10 @@
 // Converts cameras and scenes between the client and the wire.
 import { add, dot, scale, sub, type Vec3 } from '../base/vector';
-import type { ClipPlane, Eye, Pose } from '../camera/eye';
+import type { Clip, Eye, Pose } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
 import type { Ray } from '../camera/ray';
 import type { SceneSetup } from '../camera/scene_setup';
-import type { FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
+import type { ClipInit, FrameHeader, PoseInit, SceneFacts } from '../wire/wire';
 
 type WireVector = Pick<NonNullable<SceneFacts['up']>, 'x' | 'y' | 'z'>;
 type WirePose = NonNullable<FrameHeader['renderPose']>;
@@ -15,17 +15,21 @@ export function pose_message(
   eye: Eye,
   at_rest = false,
 ): PoseInit {
-  const [x, y, z, w] = eye.orientation;
   return {
     poseId: BigInt(pose_id),
     clientTimeUs: BigInt(Math.round(time_us)),
-    worldFromCamera: {
-      position: wire_vector(eye.position),
-      orientation: { x, y, z, w },
-    },
+    worldFromCamera: wire_pose(eye),
     fovYRad: eye.fov_y_rad,
     atRest: at_rest,
+    ...(eye.view_height !== undefined && { viewHeight: eye.view_height }),
   };
+}
+
+function wire_pose({ position, orientation: [x, y, z, w] }: Pose): {
+  position: ReturnType<typeof wire_vector>;
+  orientation: { x: number; y: number; z: number; w: number };
+} {
+  return { position: wire_vector(position), orientation: { x, y, z, w } };
 }
 
 export const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number } => ({ x, y, z });
@@ -33,14 +37,19 @@ export const wire_vector = ([x, y, z]: Vec3): { x: number; y: number; z: number 
 // Fields that a server leaves out read as zeros. The defaults here make a usable pose and scene of them.
 export const vector_of = (v: WireVector | undefined): Vec3 => [v?.x ?? 0, v?.y ?? 0, v?.z ?? 0];
 
-export function eye_of(pose: WirePose | undefined, fov_y_rad: number): Eye {
+export function eye_of(pose: WirePose | undefined, fov_y_rad: number, view_height = 0): Eye {
   const q = pose?.orientation;
   return {
     position: vector_of(pose?.position),
     orientation: [q?.x ?? 0, q?.y ?? 0, q?.z ?? 0, q?.w ?? 1],
     fov_y_rad,
+    ...(view_height > 0 && { view_height }),
   };
 }
+
+/** The camera of a picture. */
+export const eye_of_frame = ({ renderPose, fovYRad, viewHeight }: FrameHeader): Eye =>
+  eye_of(renderPose, fovYRad, viewHeight);
 
 /** The same pose about another point than 0; `by` leads from there to 0. */
 const moved_by = <T extends Pose>(pose: T, by: Vec3): T => ({
@@ -80,13 +89,14 @@ export class SceneCoordinates {
     return { origin: this.point_message(origin), direction: wire_vector(direction) };
   }
 
-  clip_message(plane: ClipPlane | undefined): {
-    normal?: ReturnType<typeof wire_vector>;
-    offset?: number;
-  } {
-    if (!plane) return {};
-    const offset = plane.offset - dot(plane.normal, this.origin_);
-    return { normal: wire_vector(plane.normal), offset };
+  clip_message(clip: Clip | undefined): ClipInit {
+    if (!clip) return {};
+    if ('normal' in clip) {
+      const offset = clip.offset - dot(clip.normal, this.origin_);
+      return { normal: wire_vector(clip.normal), offset };
+    }
+    const worldFromBox = wire_pose(this.to_scene(clip.world_from_box));
+    return { box: { worldFromBox, halfExtent: wire_vector(clip.half_extent) } };
   }
 }
 
@@ -116,6 +126,10 @@ export function scene_setup(scene: SceneFacts): SceneSetup {
     focus: position_of(scene.focus),
     limits_min: position_of(scene.limitsMin),
     limits_max: position_of(scene.limitsMax),
+    content: scene.contentMin && {
+      min: position_of(scene.contentMin),
+      max: position_of(scene.contentMax),
+    },
     near_z: scene.nearZ,
     scale: scene.scale,
     enclosed: scene.startEnclosed,

@@ -1,3 +1,4 @@
+import { section_of, type Section } from '../camera/section';
 import { unit, type Quat, type Vec3 } from '../base/vector';
 import { text } from '../text/text';
 import { max_text_characters } from './limits';
@@ -86,6 +87,11 @@ export class JsonField {
 
   orientation(): Quat {
     return unit(this.numbers(4) as unknown as Quat);
+  }
+
+  section(): Section {
+    const numbers = this.numbers(7);
+    return section_of(numbers) ?? this.fail(mistakes.not_in({ low: 1e-5, high: 1e9 }));
   }
 
   /** A vertical field of view, written in degrees. */

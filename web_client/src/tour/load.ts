@@ -1,8 +1,9 @@
+import { load_part } from '../base/load_part';
 import { ask_server, scene_path } from '../base/server';
 import type { Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { read_measures, type Measure } from './measures';
-import { read_supersplat } from './supersplat';
+import type { read_supersplat } from './supersplat';
 import { read_tours, type Tour } from './tour';
 
 interface SceneTours {
@@ -18,6 +19,8 @@ export interface TourDocument {
   readonly tours?: unknown;
   readonly measures?: unknown;
   readonly settings?: unknown;
+  /** Loaded where there are settings. */
+  readonly read_settings?: typeof read_supersplat;
   /** Tag of the sidecar; null: there is none. */
   readonly etag?: string | null;
 }
@@ -45,7 +48,9 @@ export function read_document(
   };
   const own = attempt(document.tours, () => read_tours(document.tours, up, fov_y_rad));
   const { measures, problems: unread_measures } = read_measures(document.measures);
-  const imported = attempt(document.settings, () => read_supersplat(document.settings, aspect));
+  const imported = attempt(document.settings, () =>
+    document.read_settings?.(document.settings, aspect),
+  );
   return {
     tours: [
       ...(own ?? []),
@@ -72,7 +77,12 @@ export async function fetch_tours(
   try {
     const query = pass && `?${new URLSearchParams({ pass }).toString()}`;
     const response = await ask_server(page_url, token, scene_path(scene_id, `tours${query}`));
-    return response.ok ? { ...nothing, ...((await response.json()) as object) } : nothing;
+    if (!response.ok) return nothing;
+    const answer = { ...nothing, ...((await response.json()) as Partial<typeof nothing>) };
+    const document: TourDocument = answer.document;
+    if (document.settings === undefined) return answer;
+    const { read_supersplat } = await load_part(() => import('./supersplat'));
+    return { ...answer, document: { ...document, read_settings: read_supersplat } };
   } catch (error) {
     console.warn('the tours of the scene could not be read', error);
     return nothing;

@@ -2,6 +2,7 @@
 import type { Timers } from '../base/clock';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, path_of, type Flight, type PathSample } from '../camera/flight';
+import type { Section } from '../camera/section';
 import { default_stay_s, flight_to, type Stop, type Tour } from './tour';
 
 interface Guided {
@@ -17,6 +18,8 @@ interface TourEnvironment {
   now_us(): number;
   /** Tells the server the path, for its forecasts. */
   announce(path: readonly PathSample[]): void;
+  /** What is drawn from now on; undefined: all. */
+  show_section(section: Section | undefined): void;
   /** The visitor has come to a stop. */
   reached(tour_index: number, stop_index: number): void;
   /** Calls `then` when nothing speaks at this stop any more, if that is not so now. The result cancels it. */
@@ -108,6 +111,7 @@ export class TourPlayer {
     this.playing_ = false;
     this.tour_index_ = index;
     this.stop_index_ = stop_index !== undefined && tour.stops[stop_index] ? stop_index : undefined;
+    if (this.state.stop) this.env_.show_section(this.state.stop.section);
     this.tell();
   }
 
@@ -172,6 +176,7 @@ export class TourPlayer {
     this.stop_index_ = stop_index;
     const way = at_once ? glide(from, stop.eye, 0) : flight_to(stop, from, camera.reach);
     const journey = this.set_out();
+    this.env_.show_section(stop.section);
     camera.fly(way, (arrived) => {
       if (journey !== this.journey_) return;
       if (arrived) this.env_.reached(this.tour_index_, stop_index);

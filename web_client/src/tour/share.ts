@@ -2,6 +2,7 @@
 import { normalize, short_coordinate, unit, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { camera_modes, type CameraMode } from '../camera/mode';
+import { section_of, type Section } from '../camera/section';
 import { text } from '../text/text';
 import { add_to_link, type Measure } from './measures';
 
@@ -10,6 +11,8 @@ export interface SharedView {
   readonly mode: CameraMode | undefined;
   /** Unit; undefined: the scene's own. */
   readonly up?: Vec3 | undefined;
+  /** Undefined: all of the scene is drawn. */
+  readonly section?: Section | undefined;
   readonly tour_index: number | undefined;
   readonly stop_index: number | undefined;
 }
@@ -27,10 +30,13 @@ export function share_address(
   url.search = parameters.toString();
   const fragment = new URLSearchParams();
   if (view.eye) {
-    const { position, orientation, fov_y_rad } = view.eye;
+    const { position, orientation, fov_y_rad, view_height } = view.eye;
     const numbers = [...position, ...orientation, (fov_y_rad * 180) / Math.PI];
     fragment.set('at', numbers.map((v) => String(short_coordinate(v, 6))).join(','));
+    if (view_height) fragment.set('height', String(short_coordinate(view_height, 6)));
   }
+  if (view.section)
+    fragment.set('section', view.section.map((v) => short_coordinate(v, 6)).join(','));
   if (view.mode) fragment.set('mode', view.mode);
   if (view.up) fragment.set('up', view.up.map((v) => String(Number(v.toPrecision(6)))).join(','));
   if (view.tour_index) fragment.set('tour', String(view.tour_index + 1));
@@ -61,9 +67,10 @@ export function read_shared(page_url: string): SharedView {
   };
   const mode = camera_modes.find((name) => name === fragment.get('mode'));
   return {
-    eye: read_eye(fragment.get('at') ?? ''),
+    eye: read_eye(fragment.get('at') ?? '', Number(fragment.get('height'))),
     mode,
     up: read_up(fragment.get('up') ?? ''),
+    section: section_of((fragment.get('section') ?? '').split(',').map(Number)),
     tour_index: ordinal('tour'),
     stop_index: ordinal('stop'),
   };
@@ -77,7 +84,7 @@ function read_up(written: string): Vec3 | undefined {
   return good ? normalize([x, y, z], [0, -1, 0]) : undefined;
 }
 
-function read_eye(written: string): Eye | undefined {
+function read_eye(written: string, view_height: number): Eye | undefined {
   const parts = written.split(',');
   const numbers = parts.map(Number);
   const [px, py, pz, x, y, z, w, fov_deg] = numbers as [
@@ -102,6 +109,7 @@ function read_eye(written: string): Eye | undefined {
     position: [px, py, pz],
     orientation: unit([x, y, z, w]),
     fov_y_rad: (fov_deg * Math.PI) / 180,
+    ...(view_height >= 1e-6 && view_height < 1e9 && { view_height }),
   };
 }
 

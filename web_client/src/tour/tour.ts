@@ -2,6 +2,7 @@
 import { look_at, short_coordinate, type Quat, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { glide, glide_time_s, type Flight } from '../camera/flight';
+import type { Section } from '../camera/section';
 import { text } from '../text/text';
 import { in_language, write_translations } from '../text/translations';
 import { JsonField } from './json_field';
@@ -39,6 +40,8 @@ export interface Portal {
 export interface Stop extends Worded {
   readonly caption: string;
   readonly eye: Eye;
+  /** What is drawn there; undefined: all. */
+  readonly section?: Section | undefined;
   /** Place of its hotspot in the scene; undefined: it has none. */
   readonly marker: Vec3 | undefined;
   /** Time that autoplay stays; undefined: as long as the caption takes to read. */
@@ -99,7 +102,13 @@ function read_stop(stop: JsonField, up: Vec3, fov_y_rad: number): Stop {
     title: stop.find('title')?.text() ?? '',
     caption: stop.find('caption')?.text() ?? '',
     ...read_words(stop),
-    eye: { position, orientation, fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad },
+    eye: {
+      position,
+      orientation,
+      fov_y_rad: stop.find('fov_deg')?.fov_rad() ?? fov_y_rad,
+      view_height: stop.find('view_height')?.number(1e-6),
+    },
+    section: stop.find('section')?.section(),
     marker: stop.find('marker')?.vec3(),
     stay_s: stop.find('stay_s')?.number(0, longest_stay_s),
     fly_s: stop.find('fly_s')?.number(0, longest_flight_s),
@@ -172,6 +181,8 @@ export function write_tours(tours: readonly Tour[]): unknown[] {
         position: stop.eye.position.map(short),
         orientation: stop.eye.orientation.map(short),
         fov_deg: degrees(stop.eye.fov_y_rad),
+        ...(stop.eye.view_height && { view_height: short(stop.eye.view_height) }),
+        ...(stop.section && { section: stop.section.map(short) }),
         ...(stop.marker && { marker: stop.marker.map(short) }),
         ...(stop.stay_s !== undefined && { stay_s: stop.stay_s }),
         ...(stop.fly_s !== undefined && { fly_s: stop.fly_s }),

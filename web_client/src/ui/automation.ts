@@ -1,7 +1,7 @@
 // window.catgs: a small interface for tests and for pages that drive the viewer (EMBED.md).
 import { browser_timers, type Clock, type Timers } from '../base/clock';
 import type { CameraController } from '../camera/camera_controller';
-import type { Pose } from '../camera/eye';
+import { half_height, same_projection, type Pose } from '../camera/eye';
 import { same_angle_rad, same_view } from '../camera/same_view';
 import type { Navigation } from '../page/navigation';
 import type { StatsSnapshot } from '../stats/metrics';
@@ -115,8 +115,11 @@ export function make_automation(
  */
 function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: number): boolean {
   if (shown.pose_id >= newest_pose_id) return true;
+  const { eye } = camera;
+  const [a, b] = [half_height(shown.eye), half_height(eye)];
   return (
-    Math.abs(shown.fov_y_rad - camera.fov_y_rad) < same_angle_rad &&
-    same_view(shown.pose, camera.pose, camera.scene)
+    same_projection(shown.eye, eye) &&
+    Math.abs(a - b) < same_angle_rad * Math.max(1, b) &&
+    same_view(shown.eye, eye, camera.scene)
   );
 }

@@ -18,6 +18,7 @@ export function mount_panels(
   new QualityPanel(navigation, stream_size, worker, storage);
   mount_statistics(parts);
   mount_measuring(parts, measures, set_scale);
+  mount_views(parts, measures);
   navigation.speed_chosen.listen((speed) =>
     notice.show(text.quality.speed_now({ factor: factor(speed) }), 2),
   );
@@ -52,6 +53,20 @@ function mount_statistics({ worker, toolbar }: PageParts): void {
   });
   toolbar.panel_shown.listen(({ panel, shown }) => {
     if (panel === 'stats' && shown) load();
+  });
+}
+
+/** Plan and section load when somebody opens their panel, or when a link or a stop has an orthographic view. */
+function mount_views(parts: PageParts, measures: MeasureList): void {
+  const load = loads_once(async () => {
+    const { ViewsPanel } = await load_part(() => import('./views_panel'));
+    new ViewsPanel({ ...parts, measures });
+  });
+  parts.toolbar.panel_shown.listen(({ panel, shown }) => {
+    if (panel === 'views' && shown) load();
+  });
+  parts.navigation.sampled.listen(({ eye }) => {
+    if (eye.view_height !== undefined) load();
   });
 }
 

@@ -27,11 +27,11 @@ export class PortalTravel {
     worker.on('state', ({ state }) => {
       if (state.phase === 'failed') this.stay();
     });
-    worker.on('presented', ({ pose_id, pose }) => {
+    worker.on('presented', ({ pose_id, eye }) => {
       if (this.awaited_ === undefined) return;
       // The server does not draw a pose again that gives the same picture.
       const { camera } = navigation;
-      if (pose_id >= this.awaited_ || same_view(pose, camera.pose, camera.scene)) this.uncover();
+      if (pose_id >= this.awaited_ || same_view(eye, camera.pose, camera.scene)) this.uncover();
     });
     window.addEventListener('popstate', () => {
       if (this.leads_elsewhere) void this.go(undefined, this.address_scene);

@@ -36,13 +36,14 @@ export class SceneTours {
     private readonly scenes_: PortalScenes,
     private readonly media_: TourMediaPart,
   ) {
-    const { clock, worker, navigation, reduced_motion } = parts_;
+    const { clock, worker, navigation, clipping, reduced_motion } = parts_;
     this.player = new TourPlayer(
       {
         camera: navigation,
         timers: browser_timers,
         now_us: () => clock.now_us(),
         announce: (samples) => worker.post({ kind: 'path', samples }),
+        show_section: (section) => (clipping.section = section),
         reached: (tour, stop) => {
           // Imported tours may be longer than those that the wire can tell of.
           if (tour < max_tours && stop < max_stops) worker.post({ kind: 'reached', tour, stop });

@@ -60,9 +60,9 @@ export class SharedTour {
       this.show();
     });
     worker.on('lead', ({ lead, eye }) => this.heard(lead, eye));
-    worker.on('presented', ({ pose, fov_y_rad }) => {
+    worker.on('presented', ({ eye }) => {
       if (this.role_ !== 'watching') return;
-      this.host_eye_ = { ...pose, fov_y_rad };
+      this.host_eye_ = eye;
     });
     navigation.entered.listen(() => {
       // A visitor who watched continues from the host's view.

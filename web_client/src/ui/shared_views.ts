@@ -8,7 +8,7 @@ import { share_address, type SharedView } from '../tour/share';
 
 export class SharedViews {
   constructor(
-    private readonly parts_: Pick<PageParts, 'navigation' | 'notice'>,
+    private readonly parts_: Pick<PageParts, 'navigation' | 'clipping' | 'notice'>,
     private readonly player_: TourPlayer,
   ) {}
 
@@ -16,7 +16,8 @@ export class SharedViews {
   get present(): SharedView {
     const { camera, chosen_up } = this.parts_.navigation;
     const { tour_index, stop_index } = this.player_.state;
-    return { eye: camera.eye, mode: camera.mode, up: chosen_up, tour_index, stop_index };
+    const { section } = this.parts_.clipping;
+    return { eye: camera.eye, mode: camera.mode, up: chosen_up, section, tour_index, stop_index };
   }
 
   /** A link to it, with these measures. */
@@ -24,11 +25,12 @@ export class SharedViews {
     return share_address(location.href, this.parts_.navigation.scene_id, this.present, measures);
   }
 
-  /** Up, mode and camera of a shared view. */
-  show({ eye, mode, up }: SharedView): void {
+  /** Up, mode, camera and section of a shared view. */
+  show({ eye, mode, up, section }: SharedView): void {
     if (up) this.parts_.navigation.choose_up(up);
     if (mode) this.parts_.navigation.set_mode(mode);
     if (!eye) return;
+    this.parts_.clipping.section = section;
     this.player_.pause();
     this.put(eye);
   }

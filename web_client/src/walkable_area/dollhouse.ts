@@ -4,15 +4,15 @@ import { add, forward, rotate, scale } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
 import type { Pointed } from '../input/pointers';
+import type { Clipping } from '../page/clipping';
 import type { Navigation } from '../page/navigation';
 import { ceiling_cut, dollhouse_eye } from '../walk/dollhouse';
 import { floor_along } from '../walk/floor';
 import type { Block, Stand, WalkMap } from '../walk/walk_map';
-import type { WorkerClient } from '../worker/client';
 
 interface DollhouseParts {
   readonly view: HTMLElement;
-  readonly worker: WorkerClient;
+  readonly clipping: Clipping;
   readonly navigation: Navigation;
   readonly reduced_motion: boolean;
   /** The visitor has pointed at a point on the floor. */
@@ -42,9 +42,9 @@ export class Dollhouse {
   }
 
   show(storey: number): void {
-    const { navigation, view, worker, reduced_motion } = this.parts_;
+    const { navigation, view, clipping, reduced_motion } = this.parts_;
     const { camera } = navigation;
-    worker.post({ kind: 'clip', plane: ceiling_cut(this.map_, storey) });
+    clipping.ceiling = ceiling_cut(this.map_, storey);
     if (!this.before_) {
       this.before_ = { eye: navigation.eye, mode: camera.mode };
       navigation.taken_over.emit();
@@ -95,8 +95,8 @@ export class Dollhouse {
   close(): void {
     if (!this.before_) return;
     this.before_ = undefined;
-    const { navigation, worker } = this.parts_;
-    worker.post({ kind: 'clip', plane: undefined });
+    const { navigation, clipping } = this.parts_;
+    clipping.ceiling = undefined;
     navigation.camera.unlimited = false;
     navigation.gestures.remove('dollhouse');
     this.changed.emit(false);

@@ -71,10 +71,11 @@ export class WalkableArea {
       if (panel === 'plan' && shown) this.open_plan().catch(warn);
     });
     seen.moved.listen((eye) => {
-      this.eye_ = eye;
       this.walking_?.move(eye);
-      this.plan_?.move(eye);
       this.door_?.move(eye);
+      if (eye.view_height !== undefined) return; // the visitor stays where they were, and sees a plan
+      this.eye_ = eye;
+      this.plan_?.move(eye);
     });
     navigation.changed.listen(() => this.walking_?.draw());
     tour_shown.listen((state) => {

@@ -169,7 +169,7 @@ export class Walking {
   private take({ x, y, how }: Pointed): boolean {
     const { navigation } = this.parts_;
     const to =
-      navigation.camera.mode === 'walk'
+      navigation.camera.mode === 'walk' && !navigation.camera.is_orthographic
         ? floor_along(this.map, navigation.ray_at(x, y))
         : undefined;
     if (!to) return false;

@@ -6,6 +6,7 @@ import {
   FrameHeaderSchema,
   ServerMessageSchema,
   type AckSchema,
+  type ClipSchema,
   type FrameHeader,
   type HelloSchema,
   type PoseSampleSchema,
@@ -33,6 +34,7 @@ export type ClientBody = NonNullable<MessageInitShape<typeof ClientMessageSchema
 export type HelloInit = MessageInitShape<typeof HelloSchema>;
 export type PoseInit = MessageInitShape<typeof PoseSampleSchema>;
 export type AckInit = MessageInitShape<typeof AckSchema>;
+export type ClipInit = MessageInitShape<typeof ClipSchema>;
 export type SettingsInit = MessageInitShape<typeof SettingsSchema>;
 
 export type Incoming =

@@ -1,6 +1,6 @@
 // Messages between page and worker. They are structured clones, so they hold plain data only.
 import type { Vec3 } from '../base/vector';
-import type { CameraSample, ClipPlane, Eye, Pose } from '../camera/eye';
+import type { CameraSample, Clip, Eye } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import type { Ray } from '../camera/ray';
 import type { DecoderRung } from '../decode/ladder';
@@ -59,7 +59,7 @@ export type ToWorker =
   /** The visitor may go to this scene soon. */
   | { kind: 'prepare'; scene_id: string }
   /** Undefined: nothing is left out. */
-  | { kind: 'clip'; plane: ClipPlane | undefined }
+  | { kind: 'clip'; clip: Clip | undefined }
   /** Which of these points does the scene hide? 'hidden_markers' answers, and tells of changes. */
   | { kind: 'markers'; id: number; points: readonly Vec3[] }
   /** What the visitor sees of the tours, for those in a shared tour with them. */
@@ -109,7 +109,7 @@ export type FromWorker =
   | { kind: 'stayed'; message: string }
   /** No video decoder is left. The worker asks for JPEG pictures instead. */
   | { kind: 'fallback'; message: string }
-  | { kind: 'presented'; pose_id: number; pose: Pose; fov_y_rad: number }
+  | { kind: 'presented'; pose_id: number; eye: Eye }
   | { kind: 'stats'; request: number; stats: StatsReport }
   | { kind: 'snapshot'; request: number; snapshot: Snapshot | undefined }
   /** Something failed in the worker, which goes on. */

@@ -1,7 +1,7 @@
 // The worker does everything between socket and canvas, so that a busy page delays no picture.
 import { browser_timers, clock_from } from '../base/clock';
 import { refreshes } from '../base/patience';
-import type { CameraSample, Eye } from '../camera/eye';
+import { widened, type CameraSample, type Eye } from '../camera/eye';
 import type { PathSample } from '../camera/flight';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
@@ -9,8 +9,13 @@ import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make
 import type { DecoderEvents } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
-import { widened_fov } from '../present/warp';
-import { eye_of, pose_message, SceneCoordinates, show_message } from '../session/camera_messages';
+import {
+  eye_of,
+  eye_of_frame,
+  pose_message,
+  SceneCoordinates,
+  show_message,
+} from '../session/camera_messages';
 import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import type { SessionState } from '../session/state';
@@ -173,7 +178,7 @@ class Client {
     if (message.kind === 'show')
       this.session_.keep({ case: 'show', value: show_message(message.shown) });
     else if (message.kind === 'clip')
-      this.session_.keep({ case: 'clip', value: this.coordinates_.clip_message(message.plane) });
+      this.session_.keep({ case: 'clip', value: this.coordinates_.clip_message(message.clip) });
     else if (message.kind === 'follow')
       this.session_.keep({ case: 'follow', value: { watch: message.watch } });
     else {
@@ -231,8 +236,8 @@ class Client {
         timers: browser_timers,
         make_decoder: (config, failures, events) => this.make_decoder(config, failures, events),
         on_refresh,
-        draw: (picture, { renderPose, fovYRad, widthPx, heightPx }) =>
-          this.display_.draw(picture, eye_of(renderPose, fovYRad), widthPx, heightPx),
+        draw: (picture, header) =>
+          this.display_.draw(picture, eye_of_frame(header), header.widthPx, header.heightPx),
       },
       {
         ack: (ack) => this.session_.send({ case: 'ack', value: ack }),
@@ -242,8 +247,9 @@ class Client {
           say({
             kind: 'presented',
             pose_id: Number(frame.header.poseId),
-            pose: this.coordinates_.to_file(eye_of(frame.header.renderPose, 0)),
-            fov_y_rad: widened_fov(frame.header.fovYRad, 1 / this.display_.overscan.y),
+            eye: this.coordinates_.to_file(
+              widened(eye_of_frame(frame.header), 1 / this.display_.overscan.y),
+            ),
           });
         },
         dropped: () => this.metrics_.dropped(),
@@ -319,7 +325,9 @@ class Client {
   private led(lead: Lead): void {
     this.host_ = lead.name;
     const { camera } = lead;
-    const eye = camera && this.coordinates_.to_file(eye_of(camera.worldFromCamera, camera.fovYRad));
+    const eye =
+      camera &&
+      this.coordinates_.to_file(eye_of(camera.worldFromCamera, camera.fovYRad, camera.viewHeight));
     say({ kind: 'lead', lead, eye });
   }
 
@@ -351,7 +359,7 @@ class Client {
   }
 
   private widened(eye: Eye): Eye {
-    return { ...eye, fov_y_rad: widened_fov(eye.fov_y_rad, this.display_.overscan.y) };
+    return widened(eye, this.display_.overscan.y);
   }
 
   private tell_presenter(): void {

@@ -148,6 +148,31 @@ TEST(TourPlaces, MeasuresMoveAndTheirErrorsGrowWithTheScene) {
   EXPECT_EQ(fields["measures"][0]["title"], "Door");
 }
 
+TEST(TourPlaces, SectionsMoveTurnAndGrowWithTheScene) {
+  struct Case {
+    glm::vec3 axis;  // of a quarter of a turn
+    glm::vec3 up;    // of the placed scene
+    double turn;
+  };
+  for (const auto& [axis, up, turn] :
+       {Case{{0, -1, 0}, {0, -1, 0}, 120.0},  // about the vertical
+        Case{{1, 0, 0}, {0, 0, -1}, 30.0}, Case{{0, 0, 1}, {1, 0, 0}, -60.0}}) {
+    auto stop = nlohmann::ordered_json::parse(
+        R"({"view_height": 5, "section": [1, 2, 3, 4, 6, 8, 30], "more": {"section": [1]}})");
+    SceneHints hints;
+    hints.up = up;
+    const glm::dquat rotation = glm::angleAxis(glm::radians(90.0), glm::dvec3(axis));
+    place_tours(stop, Placement{2.0, rotation, {10, 0, 0}}, hints);
+    EXPECT_EQ(stop["view_height"], 10.0);
+    std::vector<double> expected{0, 0, 0, 8, 12, 16, turn};
+    const glm::dvec3 centre = 2.0 * (rotation * glm::dvec3(1, 2, 3)) + glm::dvec3(10, 0, 0);
+    for (int k = 0; k < 3; ++k) expected[static_cast<std::size_t>(k)] = centre[k];
+    EXPECT_THAT(stop["section"].get<std::vector<double>>(),
+                ::testing::Pointwise(::testing::DoubleNear(1e-4), expected));
+    EXPECT_EQ(stop["more"]["section"], nlohmann::ordered_json({1}));
+  }
+}
+
 TEST(TourPlaces, StopsMoveAndTurnWithTheScene) {
   auto tours = nlohmann::ordered_json::parse(R"([{"title": "Way", "stops": [
     {"position": [1, 2, 3], "look_at": [0, 0, 4], "marker": [1, 0, 0], "fov_deg": 60},

@@ -363,6 +363,40 @@ TEST_F(Frames, FarScenesClipAndTellCamerasInFileCoordinates) {
   EXPECT_THAT(run(fmt::format("compare {} {}", near, clipped)).out, HasSubstr("5.44e+06 units"));
 }
 
+/// Pictures of the CPU core against the reference, and what they show.
+TEST_F(Frames, OrthographicViewsAndSectionsEqualTheReference) {
+  std::ofstream(path("wall.json")) << R"({"up": "-y"})";
+  const auto drawn = [&](const std::string& renderer, const std::string& flags) {
+    const std::string out = path(renderer + ".png");
+    const Outcome done = run(fmt::format(
+        "--quiet frames {} --size 64x48 --near 0.1 --renderer {} --trace {} --out {} {}",
+        path("wall.ply"), renderer, path("still.tum"), out, flags));
+    EXPECT_EQ(done.exit_code, 0) << done.out;
+    return out;
+  };
+  // The wall begins at x = 0.5: at the 40th of 64 columns of a view that is 4 units high.
+  struct Case {
+    const char* flags;
+    int dark_column, wall_column;
+  };
+  for (const auto& [flags, dark, wall] :
+       {Case{"--orthographic 4", 33, 44}, Case{"--orthographic 8", 31, 40},
+        Case{"--orthographic 4 --section=2,0,3,1.56,1,3.9,0", 42, 52},
+        // A quarter of a turn about the vertical changes width and depth.
+        Case{"--orthographic 4 --section=2,0,3,1,1.56,3.9,90", 42, 52},
+        Case{"--focal-px 40 --section=2,0,3,1.56,1,3.9,0", 44, 54}}) {
+    SCOPED_TRACE(flags);
+    const std::string picture = drawn("cpu", flags), expected = drawn("reference", flags);
+    EXPECT_EQ(run(fmt::format("compare {} {} --require-psnr 55 --require-same-cameras", picture,
+                              expected))
+                  .exit_code,
+              0);
+    const Image image = read_png(picture);
+    EXPECT_LT(image.row(24)[static_cast<std::ptrdiff_t>(3) * dark], 0.1f);
+    EXPECT_GT(image.row(24)[static_cast<std::ptrdiff_t>(3) * wall], 0.6f);
+  }
+}
+
 TEST_F(Frames, APanoramaShowsAllAround) {
   std::ofstream(path("wall.json")) << R"({"up": "-y"})";
   const auto panorama = [&](const std::string& size, const std::string& out) {
