@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include "render_core/base/error.h"
 #include "render_core/scene/tree/paged_tree.h"
@@ -26,6 +27,7 @@ PagePool::PagePool(std::uint32_t slots, std::uint64_t bytes, int settling_turns)
       settling_turns_(settling_turns),
       free_(std::make_shared<FreeSlots>(slots)),
       choice_(slots),
+      holders_(slots),
       readers_(readers()),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
@@ -55,6 +57,7 @@ std::uint32_t PagePool::add(PagedTree& tree) {
     tree.open();
   } catch (...) {
     choice_.remove(number);
+    std::ranges::replace(holders_, &tree, nullptr);
     free_->ring();  // the pages that made room for it may come back
     throw;
   }
@@ -64,8 +67,18 @@ std::uint32_t PagePool::add(PagedTree& tree) {
 
 void PagePool::remove(std::uint32_t number) {
   const std::lock_guard lock(turn_mutex_);
-  trees_.erase(number);
+  const auto found = trees_.find(number);
+  if (found == trees_.end()) return;
+  std::ranges::replace(holders_, found->second, nullptr);
+  trees_.erase(found);
   choice_.remove(number);
+}
+
+std::uint32_t PagePool::take_slot(PagedTree& tree) {
+  const std::uint32_t slot = free_->take();
+  PagedTree* const before = std::exchange(holders_[slot], &tree);
+  if (before != nullptr && before != &tree) before->forget(slot);
+  return slot;
 }
 
 void PagePool::run(const std::stop_token& stop) {

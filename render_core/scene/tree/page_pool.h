@@ -8,6 +8,7 @@
 #include <mutex>
 #include <stop_token>
 #include <thread>
+#include <vector>
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/scene/tree/free_slots.h"
@@ -48,6 +49,9 @@ class PagePool {
   /// Looks at the cuts of all Views, and then loads and drops pages. Returns whether any came or
   /// went. The pool's thread does so by itself.
   bool turn();
+  /// Takes a free slot for a page of `tree`, in its turn. Another tree's memory there is given
+  /// back.
+  [[nodiscard]] std::uint32_t take_slot(PagedTree& tree);
 
  private:
   void run(const std::stop_token& stop);
@@ -61,10 +65,11 @@ class PagePool {
   const std::shared_ptr<FreeSlots> free_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 
-  std::mutex turn_mutex_;  // one turn at a time; guards the next three
+  std::mutex turn_mutex_;  // one turn at a time; guards the next four
   PageChoice choice_;
   std::map<std::uint32_t, PagedTree*> trees_;
   std::uint32_t next_number_ = 0;
+  std::vector<PagedTree*> holders_;  // [slot]: the tree that has memory there
 
   mutable std::mutex failure_mutex_;
   std::exception_ptr failure_;  // that ended the pool

@@ -31,7 +31,7 @@ PagedTree::~PagedTree() {
 
 void PagedTree::open() {
   const std::uint64_t root = shape().page_of(shape().root());
-  const Page page = read(root, pool_->free()->take());
+  const Page page = read(root, pool_->take_slot(*this));
   if (!page) throw InputError("", "", file_->damage().first, "convert the scene again");
   publish(std::span(&page, 1), {});
 }
@@ -85,8 +85,8 @@ std::span<const PagedTree::Seen> PagedTree::look() {
   for (auto& watch : watches()) {
     const auto [demand, number] = watch->demand();
     if (number == 0) continue;  // it has not looked yet
-    Cut cut =
-        table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity());
+    Cut cut = table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity(),
+                          {.part = CutParts::Part::pages});
     // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
       return broken_.contains(family_of(shape(), use.page));
@@ -151,7 +151,7 @@ std::vector<PagedTree::Page> PagedTree::read(std::span<const std::uint64_t> numb
                                              ThreadPool& readers) {
   std::vector<Page> pages(numbers.size());
   std::vector<std::uint32_t> slots;
-  for (std::size_t i = 0; i < numbers.size(); ++i) slots.push_back(pool_->free()->take());
+  for (std::size_t i = 0; i < numbers.size(); ++i) slots.push_back(pool_->take_slot(*this));
   readers.parallel_for(numbers.size(),
                        [&](std::size_t i) { pages[i] = read(numbers[i], slots[i]); });
   std::unordered_set<std::uint64_t> broken;  // families
@@ -163,11 +163,8 @@ std::vector<PagedTree::Page> PagedTree::read(std::span<const std::uint64_t> numb
 }
 
 PagedTree::Page PagedTree::read(std::uint64_t number, std::uint32_t slot) {
-  const std::shared_ptr<void> release(nullptr,
-                                      [free = pool_->free(), store = &store_, slot](void*) {
-                                        store->release(slot);
-                                        free->give_back(slot);
-                                      });
+  const std::shared_ptr<void> release(
+      nullptr, [free = pool_->free(), slot](void*) { free->give_back(slot); });
   const std::unique_ptr<const TreePage> bytes = file_->page(number, table_->facts_above(number));
   if (!bytes) return nullptr;
   store_.put(slot, *bytes, number);

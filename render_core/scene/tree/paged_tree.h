@@ -31,7 +31,7 @@ class PageStore {
   /// Called before frames may see the table. When it returns, all of its pages can be read. May set
   /// PageTable::of_core.
   virtual void publish(PageTable& table) = 0;
-  /// The slot has no page of this tree any more, and no frame reads it.
+  /// The slot is another tree's from now on. No frame reads this tree's pages there.
   virtual void release(std::uint32_t slot) = 0;
 };
 
@@ -76,10 +76,12 @@ class PagedTree {
     std::shared_ptr<Watch> watch;
     std::uint64_t number;  // of its demand
     bool at_once;
-    Cut cut;  // pages that are only being blended in count as shown
+    Cut cut;  // its pages alone; those that are only being blended in count as shown
   };
   /// The cuts of all Views.
   [[nodiscard]] std::span<const Seen> look();
+  /// Gives back the memory for a slot that another tree takes.
+  void forget(std::uint32_t slot) { store_.release(slot); }
   /// Loads and drops pages, and tells the Views that look() has seen. Returns the pages that cannot
   /// be read; their families are not loaded.
   std::vector<std::uint64_t> change(const PageChanges& changes, ThreadPool& readers);

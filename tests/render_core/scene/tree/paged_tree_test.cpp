@@ -30,13 +30,15 @@ struct Slots {
 /// read.
 class RecordingStore final : public PageStore {
  public:
-  explicit RecordingStore(Slots& slots) : slots_(slots), held_(slots.readers.size()) {}
+  explicit RecordingStore(Slots& slots)
+      : slots_(slots), held_(slots.readers.size()), has_memory_(slots.readers.size()) {}
 
   void put(std::uint32_t slot, const TreePage& page, std::uint64_t number) override {
     if (broken) throw std::runtime_error("the device is lost");
     EXPECT_EQ(slots_.readers[slot].load(), 0) << "slot " << slot << " is being read";
     EXPECT_GT(page.facts(0).count, 0u);
     held_[slot] = number;
+    has_memory_[slot] = true;
     const std::lock_guard lock(mutex_);
     ++loads_[number];
   }
@@ -47,7 +49,11 @@ class RecordingStore final : public PageStore {
   void release(std::uint32_t slot) override {
     EXPECT_EQ(slots_.readers[slot].load(), 0) << "slot " << slot << " is being read";
     held_[slot] = ~std::uint64_t{0};
+    has_memory_[slot] = false;
+    ++released_;
   }
+  [[nodiscard]] bool has_memory(std::uint32_t slot) const { return has_memory_[slot]; }
+  [[nodiscard]] int released() const { return released_; }
   /// Reads all slots of a table, as a frame does.
   void read(const PageTable& table) {
     for (const auto& page : table.pages()) ++slots_.readers[page->slot];
@@ -70,6 +76,8 @@ class RecordingStore final : public PageStore {
  private:
   Slots& slots_;
   std::vector<std::atomic<std::uint64_t>> held_;
+  std::vector<std::atomic<bool>> has_memory_;
+  std::atomic<int> released_{0};
   std::mutex mutex_;
   std::map<std::uint64_t, int> loads_;
   std::atomic<int> published_{0};
@@ -114,6 +122,22 @@ class PagedTreeTest : public testing::Test {
   ThreadPool pool_{2};
   std::string bytes_ = tree_bytes(random_cloud(60'000, 0, 11), pool_);
 };
+
+TEST_F(PagedTreeTest, MemoryOfASlotStaysWithItsTreeUntilAnotherTakesIt) {
+  constexpr std::uint32_t count = 9;
+  Slots slots(count);
+  Looked first(slots, tree());
+  first.settle(camera_at(0, -6));
+  EXPECT_EQ(first.tree.table()->size(), count);
+  Looked second(slots, tree());
+  EXPECT_EQ(first.tree.table()->size(), count - 2);
+  EXPECT_EQ(first.store.released(), 1) << "the second root takes one of the two slots";
+  first.watch.reset();
+  second.settle(camera_at(0, -6));
+  EXPECT_GT(first.store.released(), 1);
+  for (std::uint32_t slot = 0; slot < count; ++slot)
+    EXPECT_FALSE(first.store.has_memory(slot) && second.store.has_memory(slot)) << slot;
+}
 
 TEST_F(PagedTreeTest, TreesSettleToWhatTheCameraNeeds) {
   Slots slots(64);
