@@ -168,13 +168,25 @@ void CpuView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
   clusters_.clear();
   shares_.clear();
   nodes_.clear();
-  const Cut cut = table.cut(paged_->cameras(), request.detail_px, paged_->now_s());
-  for (const auto& [node, share] : cut.drawn) {
-    const std::uint32_t c = table.cluster_of(node, table.shape().slots());
-    if (occlusion_.hides(scene_->store().clusters()[c])) continue;
+  CutParts parts{.part = CutParts::Part::drawn};
+  if (occlusion_.limits())
+    parts.hides = [this](const Cluster& bounds) { return occlusion_.hides(bounds); };
+  const Cut cut = table.cut(paged_->cameras(), request.detail_px, paged_->now_s(), parts);
+  const TreeShape& shape = table.shape();
+  const std::span<const Cluster> clusters = scene_->store().clusters();
+  const std::size_t drawn = cut.drawn.size();
+  const auto cluster_at = [&](std::size_t i) {
+    return static_cast<std::uint32_t>(cut.slots[i] * shape.slots() +
+                                      shape.slot_of(cut.drawn[i].node));
+  };
+  constexpr std::size_t ahead = 8;  // bounds are far apart in memory
+  for (std::size_t i = 0; i < drawn; ++i) {
+    if (i + ahead < drawn) __builtin_prefetch(&clusters[cluster_at(i + ahead)]);
+    const std::uint32_t c = cluster_at(i);
+    if (occlusion_.hides(clusters[c])) continue;
     clusters_.push_back(c);
-    shares_.push_back(share);
-    nodes_.push_back(node);
+    shares_.push_back(cut.drawn[i].share);
+    nodes_.push_back(cut.drawn[i].node);
   }
 }
 

@@ -14,10 +14,15 @@ inline constexpr int part_side_px = 4;
 inline constexpr int parts_across = tile_size_px / part_side_px;  // a tile
 
 /// The depths behind which nothing of a picture shows, as a pyramid. Level 0 has a limit for each
-/// part. A cell of the next level is the largest of 2x2. All levels have the same room.
+/// part. A cell of the next level is the largest of 2x2. All levels have the same room. Three more
+/// pyramids hold the largest of a cell and its neighbours, so that a box needs few loads.
 struct DepthLimits {
-  const float* cells = nullptr;  // [level][row][column]; null: nothing is hidden
+  enum Spread { none = 0, right = 1, below = 2, both = right | below };
+  static constexpr int spreads = both + 1;
+
+  const float* cells = nullptr;  // [spread][level][row][column]; null: nothing is hidden
   int columns = 0, rows = 0;     // of a level: parts of the picture's tiles
+  int levels = 0;
 
   static constexpr int tile_level = std::bit_width(static_cast<unsigned>(parts_across)) - 1;
 

@@ -61,17 +61,25 @@ HWY_INLINE Floats deepest_limit(const DepthLimits& limits, const Floats& left, c
   const Ints exponent = hn::Sub(hn::BitCast(d, (span + span).v), hn::Set(d, 1));
   const Ints level = hn::Sub(hn::ShiftRight<23>(exponent), hn::Set(d, 127));
   const auto cell = [&](const Floats& v) HWY_ATTR { return hn::Shr(to_ints(v), level); };
-  const Ints columns = hn::Set(d, limits.columns), one = hn::Set(d, 1);
-  const Ints first = cell(x0), last = cell(x2), middle = hn::Min(hn::Add(first, one), last);
-  const Ints top_row = cell(y0), bottom_row = cell(y2);
-  const Ints level_row = hn::Mul(level, hn::Set(d, limits.rows));
-  Floats deepest(0.0);
-  for (const Ints& row : {top_row, hn::Min(hn::Add(top_row, one), bottom_row), bottom_row}) {
-    const Ints at = hn::Mul(hn::Add(level_row, row), columns);
-    for (const Ints& column : {first, middle, last})
-      deepest = max(deepest, gather(limits.cells, hn::Add(at, column)));
-  }
-  return deepest;
+  const Ints one = hn::Set(d, 1), zero = hn::Zero(d);
+  const Ints left_cell = cell(x0), last_column = cell(x2);
+  const Ints top_cell = cell(y0), last_row = cell(y2);
+  // Where a box has several columns or rows, each load is of two.
+  const Ints right_cell = hn::Max(left_cell, hn::Sub(last_column, one));
+  const Ints low_cell = hn::Max(top_cell, hn::Sub(last_row, one));
+  const auto spread_where =
+      [&](const Ints& last, const Ints& first, DepthLimits::Spread spread)
+          HWY_ATTR { return hn::IfThenElse(hn::Gt(last, first), hn::Set(d, spread), zero); };
+  const Ints spread = hn::Or(spread_where(last_column, left_cell, DepthLimits::right),
+                             spread_where(last_row, top_cell, DepthLimits::below));
+  const Ints pyramid =
+      hn::Mul(hn::Add(hn::Mul(spread, hn::Set(d, limits.levels)), level), hn::Set(d, limits.rows));
+  const auto at = [&](const Ints& column, const Ints& row) HWY_ATTR {
+    const Ints rows = hn::Mul(hn::Add(pyramid, row), hn::Set(d, limits.columns));
+    return gather(limits.cells, hn::Add(rows, column));
+  };
+  return max(max(at(left_cell, top_cell), at(right_cell, top_cell)),
+             max(at(left_cell, low_cell), at(right_cell, low_cell)));
 }
 
 }  // namespace HWY_NAMESPACE

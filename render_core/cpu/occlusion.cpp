@@ -69,11 +69,13 @@ void Occlusion::find_limits(const SimdKernels& kernels, ThreadPool& pool) {
   const auto longest = static_cast<unsigned>(std::max(parts_.x, parts_.y));
   const int levels =
       std::max(static_cast<int>(std::bit_width(longest)), DepthLimits::tile_level) + 1;
-  limits_.resize(ends_.size() * static_cast<std::size_t>(levels));
+  limits_.resize(ends_.size() * static_cast<std::size_t>(levels * DepthLimits::spreads));
   pool.parallel_for(static_cast<std::size_t>(parts_.y), [&](std::size_t y) {
     kernels.find_limits({&now_, &*last_, deepest_.data(), room_.x, parts_, static_cast<int>(y),
                          limits_.data() + y * static_cast<std::size_t>(room_.x)});
   });
+  levels_ = levels;
+  spread_limits(0, parts_);
   glm::ivec2 size = parts_;
   for (int level = 1; level < levels; ++level) {
     const float* const finer = limits_.data() + static_cast<std::size_t>(level - 1) * ends_.size();
@@ -89,12 +91,31 @@ void Occlusion::find_limits(const SimdKernels& kernels, ThreadPool& pool) {
             std::max(std::max(upper[left], upper[right]), std::max(lower[left], lower[right]));
       }
     }
+    spread_limits(level, size);
+  }
+}
+
+/// Fills the other pyramids' cells of a level of `size` cells.
+void Occlusion::spread_limits(int level, glm::ivec2 size) {
+  const std::size_t pyramid = static_cast<std::size_t>(levels_) * ends_.size();
+  float* const first = limits_.data() + static_cast<std::size_t>(level) * ends_.size();
+  for (int y = 0; y < size.y; ++y) {
+    const float* const row = first + y * room_.x;
+    const float* const below = first + std::min(y + 1, size.y - 1) * room_.x;
+    float* const to = first + y * room_.x;
+    for (int x = 0; x < size.x; ++x) {
+      const int next = std::min(x + 1, size.x - 1);
+      const float across = std::max(row[x], row[next]);
+      to[pyramid * DepthLimits::right + x] = across;
+      to[pyramid * DepthLimits::below + x] = std::max(row[x], below[x]);
+      to[pyramid * DepthLimits::both + x] = std::max(across, std::max(below[x], below[next]));
+    }
   }
 }
 
 DepthLimits Occlusion::limits() const {
   if (!limited_) return {};
-  return {limits_.data(), room_.x, room_.y};
+  return {limits_.data(), room_.x, room_.y, levels_};
 }
 
 PartEnds Occlusion::ends_of_tile(glm::ivec2 tile) {

@@ -40,12 +40,14 @@ class Occlusion {
  private:
   void spread_ends(int radius, ThreadPool& pool);
   void find_limits(const SimdKernels& kernels, ThreadPool& pool);
+  void spread_limits(int level, glm::ivec2 size);
 
   Camera now_;
   math::CameraModel<float> model_{};  // of now_
   std::optional<Camera> last_;        // whose ends are known
   glm::ivec2 parts_{0}, room_{0};     // parts of the picture, and those of its tiles
   bool limited_ = false;
+  int levels_ = 0;  // of limits_
   // Rows of room_.x parts: ends of the last frame, then of this one; the deepest end around, in a
   // row and in all.
   std::vector<float> ends_, deepest_in_row_, deepest_;

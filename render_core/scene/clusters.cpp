@@ -116,4 +116,11 @@ ClusterCuller::ClusterCuller(const Camera& camera) {
   }
 }
 
+bool ClusterCuller::within(const Cluster& cluster) const {
+  return std::ranges::all_of(std::span(half_spaces_).first(count_), [&](const HalfSpace& h) {
+    const float centre = glm::dot(h.normal, cluster.centre) + h.offset;
+    return centre >= glm::dot(glm::abs(h.normal), cluster.half_extent);
+  });
+}
+
 }  // namespace catgs

@@ -68,6 +68,9 @@ class ClusterCuller {
   explicit ClusterCuller(const Camera& camera);
   [[nodiscard]] CATGS_HD bool outside(const Cluster& cluster) const { return beyond(cluster) != 0; }
 
+  /// Whether nothing that lies in the cluster's box is outside.
+  [[nodiscard]] bool within(const Cluster& cluster) const;
+
   /// The half-spaces that the cluster lies outside of, a bit each, in the same order for all
   /// cameras.
   [[nodiscard]] CATGS_HD unsigned beyond(const Cluster& cluster) const {

@@ -228,10 +228,13 @@ void unpack_cluster(std::span<const std::byte> block, const PackedUnits& units, 
     glm::vec3* sh = cloud.sh.data() + (first + j) * cloud.sh_count();
     sh[0] = {from_half(g.base_red), from_half(g.base_green), from_half(g.base_blue)};
     const float octave = packed_sh_octave(g.log2_opacity);
-    for (int b = 0; b < packed_sh_bytes(degree); ++b) {
-      const int k = 1 + b / 3;
-      sh[k][b % 3] = packed_sh(std::to_integer<std::uint32_t>(record[sizeof(g) + b]), 0) *
-                     (octave * units.sh[sh_degree_of(k) - 1]);
+    // Degree by degree, so that the loop needs no other choice and is compiled for many lanes.
+    for (int d = 1; d <= degree; ++d) {
+      const int begin = packed_sh_bytes(d - 1), end = packed_sh_bytes(d);
+      const float unit = octave * units.sh[d - 1];
+      float* const to = &sh[1].x;
+      for (int b = begin; b < end; ++b)
+        to[b] = packed_sh(std::to_integer<std::uint32_t>(record[sizeof(g) + b]), 0) * unit;
     }
   }
 }

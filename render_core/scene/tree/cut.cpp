@@ -23,39 +23,35 @@ struct Errors {
   float px = -1.0f, typical_px = -1.0f;
 };
 
-/// The largest errors of a node over the cameras that may see it; negative: none does.
-Errors visible_errors(std::span<const Eye> eyes, const NodeFacts& facts) {
-  if (eyes.empty()) return {unbounded_px, unbounded_px};
-  Errors largest;
-  for (const Eye& eye : eyes) {
-    if (eye.culler.outside(facts.bounds)) continue;
-    largest.px = std::max(largest.px, eye.eye.error_px(facts.error, facts.bounds));
-    largest.typical_px =
-        std::max(largest.typical_px, eye.eye.typical_px(facts.error, facts.bounds));
-  }
-  return largest;
-}
-
 /// A node on the walk, and the part of it that its ancestors leave to it.
 struct Step {
   NodeId node;
+  PageInMemory page;  // of the node
   float taken = 1.0f;
   float most_px = unbounded_px;  // the typical error of the node above
+  bool within = false;           // the node above is within all views
 };
 
 class Walk {
  public:
   Walk(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
-       const FindPage& find)
-      : shape_(shape), eyes_(cameras.begin(), cameras.end()), detail_px_(detail_px), find_(find) {}
+       const FindPage& find, const CutParts& parts)
+      : shape_(shape),
+        eyes_(cameras.begin(), cameras.end()),
+        detail_px_(detail_px),
+        find_(find),
+        parts_(parts),
+        draws_(parts.part != CutParts::Part::pages),
+        pages_(parts.part != CutParts::Part::drawn) {}
 
   Cut run() {
     const std::uint64_t first = shape_.page_of(shape_.root());
-    if (page_at(first).facts == nullptr) {
+    const PageInMemory page = find_(first);
+    if (page.facts == nullptr) {
       cut_.missing.push_back({first, unbounded_px, unbounded_px});
       return std::move(cut_);
     }
-    stack_.push_back({shape_.root()});
+    stack_.push_back({shape_.root(), page});
     while (!stack_.empty()) {
       const Step step = stack_.back();
       stack_.pop_back();
@@ -68,20 +64,39 @@ class Walk {
   }
 
  private:
-  /// Most steps stay in the page of the step before.
-  PageInMemory page_at(std::uint64_t number) {
-    if (number != last_number_) last_ = find_(number);
-    last_number_ = number;
-    return last_;
-  }
-
-  void visit(const Step& step) {
-    const NodeFacts* facts = page_at(shape_.page_of(step.node)).facts;
-    Errors errors = visible_errors(eyes_, facts[shape_.slot_of(step.node)]);
+  void visit(Step step) {
+    const NodeFacts& facts = step.page.facts[shape_.slot_of(step.node)];
+    Errors errors = visible_errors(facts, step.within);
     if (errors.px < 0.0f) return;
     errors.typical_px = std::min(errors.typical_px, step.most_px);
-    const float split = step.node.level == 0 ? 0.0f : split_into_children(step, errors);
-    if (split < step.taken) cut_.drawn.push_back({step.node, step.taken - split});
+    const bool leaf = step.node.level == 0;
+    // Who draws a leaf asks for its own bounds.
+    if (!leaf && parts_.hides && parts_.hides(facts.bounds)) return;
+    const float split = leaf ? 0.0f : split_into_children(step, errors);
+    if (!draws_ || split >= step.taken) return;
+    cut_.drawn.push_back({step.node, step.taken - split});
+    cut_.slots.push_back(step.page.slot);
+  }
+
+  /// The largest errors of a node over the cameras that may see it; negative: none does. `within`:
+  /// on entry whether the node above is within all views, then whether the node is.
+  Errors visible_errors(const NodeFacts& facts, bool& within) const {
+    if (eyes_.empty()) return {unbounded_px, unbounded_px};
+    const bool known = within;
+    within = true;
+    Errors largest;
+    for (const Eye& eye : eyes_) {
+      if (!known && eye.culler.outside(facts.bounds)) {
+        within = false;
+        continue;
+      }
+      within = within && (known || eye.culler.within(facts.bounds));
+      largest.px = std::max(largest.px, eye.eye.error_px(facts.error, facts.bounds));
+      if (pages_)
+        largest.typical_px =
+            std::max(largest.typical_px, eye.eye.typical_px(facts.error, facts.bounds));
+    }
+    return largest;
   }
 
   /// The part of a node that its children take over. They are visited next.
@@ -89,20 +104,28 @@ class Walk {
     float split = std::min(step.taken, split_share(errors.px, detail_px_));
     if (split <= 0.0f) return 0.0f;
     const auto below = static_cast<std::uint8_t>(step.node.level - 1);
-    const NodeId children[2] = {{below, 2 * step.node.index}, {below, 2 * step.node.index + 1}};
-    const std::size_t count = children[1].index < shape_.nodes_on(below) ? 2 : 1;
-    const std::uint64_t page = shape_.page_of(step.node);
-    for (const NodeId& child : std::span(children).first(count)) {
-      const std::uint64_t its_page = shape_.page_of(child);
-      if (its_page == page) continue;
-      const PageInMemory found = find_(its_page);
-      (found.facts != nullptr ? cut_.used : cut_.missing)
-          .push_back({its_page, errors.typical_px, errors.px});
-      split = found.facts != nullptr ? std::min(split, found.shown) : 0.0f;
+    Step children[2] = {{{below, 2 * step.node.index}, step.page},
+                        {{below, 2 * step.node.index + 1}, step.page}};
+    const std::size_t count = children[1].node.index < shape_.nodes_on(below) ? 2 : 1;
+    const bool ends_page = step.node.level % shape_.page_levels() == 0;
+    for (Step& child : std::span(children).first(ends_page ? count : 0)) {
+      const std::uint64_t its_page = shape_.page_of(child.node);
+      child.page = find_(its_page);
+      const bool there = child.page.facts != nullptr;
+      if (pages_)
+        (there ? cut_.used : cut_.missing).push_back({its_page, errors.typical_px, errors.px});
+      split = there ? std::min(split, child.page.shown) : 0.0f;
     }
-    if (split > 0.0f)
-      for (std::size_t i = count; i-- > 0;)
-        stack_.push_back({children[i], split, errors.typical_px});
+    const bool goes_on = draws_ || step.node.level > shape_.page_levels();
+    if (split > 0.0f && goes_on)
+      for (std::size_t i = count; i-- > 0;) {
+        Step& child = children[i];
+        child.taken = split;
+        child.most_px = errors.typical_px;
+        child.within = step.within;
+        __builtin_prefetch(&child.page.facts[shape_.slot_of(child.node)]);
+        stack_.push_back(child);
+      }
     return split;
   }
 
@@ -110,8 +133,8 @@ class Walk {
   const std::vector<Eye> eyes_;
   const float detail_px_;
   const FindPage& find_;
-  std::uint64_t last_number_ = ~std::uint64_t{0};
-  PageInMemory last_;
+  const CutParts& parts_;
+  const bool draws_, pages_;
   std::vector<Step> stack_;
   Cut cut_;
 };
@@ -119,8 +142,8 @@ class Walk {
 }  // namespace
 
 Cut choose_cut(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
-               const FindPage& find) {
-  return Walk(shape, cameras, detail_px, find).run();
+               const FindPage& find, const CutParts& parts) {
+  return Walk(shape, cameras, detail_px, find, parts).run();
 }
 
 }  // namespace catgs

@@ -105,9 +105,10 @@ struct PageUse {
 
 struct Cut {
   std::vector<DrawnNode>
-      drawn;                  // in the order of the leaves that they stand for, coarse ones first
-  std::vector<PageUse> used;  // pages whose nodes were looked at, without that of the root
-  std::vector<PageUse> missing;  // pages that would refine a node, largest error first
+      drawn;  // in the order of the leaves that they stand for, coarse ones first
+  std::vector<std::uint32_t> slots;  // PageInMemory::slot of each of them
+  std::vector<PageUse> used;         // pages whose nodes were looked at, without that of the root
+  std::vector<PageUse> missing;      // pages that would refine a node, largest error first
 };
 
 /// A page in memory. `facts`: of its slots, valid during choose_cut(); null: it is not there.
@@ -115,8 +116,18 @@ struct Cut {
 struct PageInMemory {
   const NodeFacts* facts = nullptr;
   float shown = 1.0f;
+  std::uint32_t slot = 0;  // of the core's memory; handed on to Cut::slots
 };
 using FindPage = std::function<PageInMemory(std::uint64_t page)>;
+
+/// What is wanted of a cut: all, or what a frame or a pool needs alone.
+struct CutParts {
+  enum class Part { all, drawn, pages };
+  Part part = Part::all;  // pages: those used and missing. Pages of leaves are not looked into
+  // Whether all in these bounds is hidden; empty: nothing is known of that. Hidden nodes are left
+  // out with all that they stand for.
+  std::function<bool(const Cluster&)> hides{};
+};
 
 /// The nodes to draw for all `cameras` at once, with a detail of `detail_px`. A node whose error
 /// reaches the detail in a camera that it may be visible in gives way to its children, if all of
@@ -126,6 +137,6 @@ using FindPage = std::function<PageInMemory(std::uint64_t page)>;
 /// Without cameras nothing is outside, and every error is infinite. Nothing is drawn while the
 /// root's page is missing.
 Cut choose_cut(const TreeShape& shape, std::span<const Camera> cameras, float detail_px,
-               const FindPage& find);
+               const FindPage& find, const CutParts& parts = {});
 
 }  // namespace catgs

@@ -36,7 +36,7 @@ class PageTable {
   /// Null if it is not in memory.
   [[nodiscard]] const PageInSlot* find(std::uint64_t page) const {
     const auto found = by_number_.find(page);
-    return found == by_number_.end() ? nullptr : pages_[found->second].get();
+    return found == by_number_.end() ? nullptr : found->second.page;
   }
   /// The page above a page: it holds the node that the page refines. Null for the root's.
   [[nodiscard]] const PageInSlot* above(std::uint64_t page) const {
@@ -65,33 +65,39 @@ class PageTable {
   std::shared_ptr<const void> of_core;
 
   void add(std::shared_ptr<const PageInSlot> page) {
-    by_number_[page->page] = pages_.size();
+    by_number_[page->page] = {page.get(), pages_.size()};
     pages_.push_back(std::move(page));
   }
   void remove(std::uint64_t page) {
     const auto found = by_number_.find(page);
-    const std::size_t at = found->second;
+    const std::size_t at = found->second.at;
     by_number_.erase(found);
     if (at + 1 < pages_.size()) {
       pages_[at] = std::move(pages_.back());
-      by_number_[pages_[at]->page] = at;
+      by_number_[pages_[at]->page].at = at;
     }
     pages_.pop_back();
   }
 
   /// The nodes to draw: choose_cut() of what is in memory, `now_s` in the pool's time.
-  [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px, double now_s) const {
-    return choose_cut(*shape_, cameras, detail_px, [&](std::uint64_t number) -> PageInMemory {
+  [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px, double now_s,
+                        const CutParts& parts = {}) const {
+    const auto in_memory = [&](std::uint64_t number) -> PageInMemory {
       const PageInSlot* page = find(number);
       if (page == nullptr) return {};
-      return {page->facts.data(), shown_share(now_s - page->shown_since_s)};
-    });
+      return {page->facts.data(), shown_share(now_s - page->shown_since_s), page->slot};
+    };
+    return choose_cut(*shape_, cameras, detail_px, in_memory, parts);
   }
 
  private:
   const TreeShape* shape_;
   std::vector<std::shared_ptr<const PageInSlot>> pages_;
-  std::unordered_map<std::uint64_t, std::size_t> by_number_;  // places in pages_
+  struct Entry {
+    const PageInSlot* page;
+    std::size_t at;  // in pages_
+  };
+  std::unordered_map<std::uint64_t, Entry> by_number_;
 };
 
 }  // namespace catgs

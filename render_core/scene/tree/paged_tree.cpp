@@ -85,8 +85,8 @@ std::span<const PagedTree::Seen> PagedTree::look() {
   for (auto& watch : watches()) {
     const auto [demand, number] = watch->demand();
     if (number == 0) continue;  // it has not looked yet
-    Cut cut =
-        table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity());
+    Cut cut = table_->cut(demand.cameras, demand.detail_px, std::numeric_limits<double>::infinity(),
+                          {.part = CutParts::Part::pages});
     // Unreadable pages will not arrive, and need no memory.
     std::erase_if(cut.missing, [this](const PageUse& use) {
       return broken_.contains(family_of(shape(), use.page));

@@ -76,7 +76,7 @@ class PagedTree {
     std::shared_ptr<Watch> watch;
     std::uint64_t number;  // of its demand
     bool at_once;
-    Cut cut;  // pages that are only being blended in count as shown
+    Cut cut;  // its pages alone; those that are only being blended in count as shown
   };
   /// The cuts of all Views.
   [[nodiscard]] std::span<const Seen> look();

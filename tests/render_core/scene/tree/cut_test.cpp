@@ -47,10 +47,13 @@ class SomePages {
     for (std::size_t p = 1; p < resident_.size(); ++p)
       resident_[p] = std::bernoulli_distribution(share)(random);
   }
-  [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px) const {
-    return choose_cut(shape(), cameras, detail_px, [&](std::uint64_t page) -> PageInMemory {
-      return {resident_[page] ? &pages_[page]->facts(0) : nullptr, shown_[page]};
-    });
+  [[nodiscard]] Cut cut(std::span<const Camera> cameras, float detail_px,
+                        const CutParts& parts = {}) const {
+    const auto in_memory = [&](std::uint64_t page) -> PageInMemory {
+      return {resident_[page] ? &pages_[page]->facts(0) : nullptr, shown_[page],
+              static_cast<std::uint32_t>(3 * page)};
+    };
+    return choose_cut(shape(), cameras, detail_px, in_memory, parts);
   }
   void drop(std::uint64_t page) { resident_[page] = false; }
 
@@ -182,6 +185,72 @@ TEST(Cut, CutsHaveNoHolesAndDrawNothingTwice) {
         expect_sound(tree, cameras, detail_px);  // all at once
       }
     }
+  }
+}
+
+std::vector<std::uint64_t> pages_in(std::span<const PageUse> uses) {
+  std::vector<std::uint64_t> pages;
+  for (const PageUse& use : uses) pages.push_back(use.page);
+  std::ranges::sort(pages);
+  return pages;
+}
+
+TEST(Cut, PartsAreThoseOfTheWholeCut) {
+  SomePages tree(60'001, 3, 12);
+  tree.blend_some(5);
+  std::size_t used = 0, missing = 0;
+  for (const Camera& camera : cameras_around()) {
+    const std::span cameras(&camera, 1);
+    const Cut all = tree.cut(cameras, 0.5f);
+    used = std::max(used, all.used.size());
+    missing = std::max(missing, all.missing.size());
+    const Cut pages = tree.cut(cameras, 0.5f, {.part = CutParts::Part::pages});
+    const Cut drawn = tree.cut(cameras, 0.5f, {.part = CutParts::Part::drawn});
+    EXPECT_EQ(pages_in(pages.used), pages_in(all.used));
+    EXPECT_EQ(pages_in(pages.missing), pages_in(all.missing));
+    EXPECT_TRUE(pages.drawn.empty());
+    EXPECT_TRUE(drawn.used.empty() && drawn.missing.empty());
+    ASSERT_EQ(drawn.drawn.size(), all.drawn.size());
+    ASSERT_EQ(drawn.slots.size(), all.drawn.size());
+    for (std::size_t i = 0; i < all.drawn.size(); ++i) {
+      EXPECT_EQ(drawn.drawn[i].node, all.drawn[i].node);
+      EXPECT_EQ(drawn.drawn[i].share, all.drawn[i].share);
+      EXPECT_EQ(drawn.slots[i], 3 * tree.shape().page_of(all.drawn[i].node));
+    }
+    tree.drop(tree.shape().pages() - 1 - used % 8);  // a page of leaves
+  }
+  EXPECT_GT(used, 8u) << "pages of leaves";
+  EXPECT_GT(missing, 0u);
+}
+
+TEST(Cut, HiddenSubtreesAreLeftAsAWhole) {
+  const SomePages tree(60'001, 0, 13);
+  const auto hidden = [](const Cluster& bounds) {
+    return bounds.centre.x - bounds.half_extent.x > 0.5f;
+  };
+  std::size_t asked = 0;
+  const CutParts parts{.part = CutParts::Part::drawn, .hides = [&](const Cluster& bounds) {
+                         ++asked;
+                         return hidden(bounds);
+                       }};
+  for (const Camera& camera : cameras_around()) {
+    const std::span cameras(&camera, 1);
+    std::vector<NodeId> expected, drawn;
+    for (const DrawnNode& all : tree.cut(cameras, 0.5f).drawn) {
+      bool seen = true;
+      for (int level = std::max<int>(all.node.level, 1); level < tree.shape().levels(); ++level)
+        seen = seen && !hidden(tree.facts({static_cast<std::uint8_t>(level),
+                                           all.node.index >> (level - all.node.level)})
+                                   .bounds);
+      if (seen) expected.push_back(all.node);
+    }
+    for (const DrawnNode& some : tree.cut(cameras, 0.5f, parts).drawn) drawn.push_back(some.node);
+    EXPECT_EQ(drawn, expected);
+    EXPECT_LT(expected.size(), tree.cut(cameras, 0.5f).drawn.size());
+    asked = 0;
+    const CutParts all_hidden{.hides = [&](const Cluster&) { return ++asked > 0; }};
+    EXPECT_TRUE(tree.cut(cameras, 0.0f, all_hidden).drawn.empty());
+    EXPECT_EQ(asked, 1u) << "nothing below the root is looked at";
   }
 }
 
