@@ -11,6 +11,7 @@
 
 #include "render_core/cuda/cuda_renderer.h"
 #include "render_core/cuda/cuda_view.cuh"
+#include "render_core/cuda/device_buffer.h"
 #include "render_core/cuda/place_view.h"
 
 namespace catgs {
@@ -38,6 +39,7 @@ class ViewInSlot final : public View {
     // Freeing creates a context on the current device, which must not be one that nobody selected.
     (void)cudaSetDevice(slot_.device());
     view_.reset();
+    trim_pool();
   }
 
   RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
@@ -126,6 +128,7 @@ void use_device(const std::string& flag, int index, const cudaDeviceProp& proper
                           "choose another device, or --renderer cpu");
   }
   check(cudaSetDevice(index), "device");
+  keep_pool();
   cudaFuncAttributes attributes{};
   if (const cudaError_t code = cudaFuncGetAttributes(&attributes, probe); code != cudaSuccess) {
     (void)cudaGetLastError();

@@ -9,14 +9,27 @@
 
 namespace catgs::cuda {
 
-/// Owns bytes of device memory, or of page-locked host memory when `pinned`. Grows by `reserve`,
-/// and loses its contents when it grows.
+enum class MemoryKind {
+  device,  // cudaMalloc(): for large memory that lives long
+  pooled,  // device memory from its pool, which keeps what is released: see keep_pool()
+  pinned,  // page-locked host memory
+};
+
+/// Makes the current device's pool keep what Views release, because others, or larger pictures,
+/// want it soon. Growing a View by cudaMalloc() and cudaFree() made frames of 2 to 4 ms among those
+/// of 0.5 ms, and cudaFree() waits for all frames of the device. cudaMalloc() takes what the pool
+/// keeps when the device has nothing else.
+void keep_pool();
+/// Gives what the current device's pool keeps back to the device.
+void trim_pool() noexcept;
+
+/// Owns bytes of memory. Grows by `reserve`, and loses its contents when it grows.
 class RawBuffer {
  public:
-  explicit RawBuffer(bool pinned) : pinned_(pinned) {}
+  explicit RawBuffer(MemoryKind kind) : kind_(kind) {}
   ~RawBuffer() { release(); }
   RawBuffer(RawBuffer&& other) noexcept
-      : pinned_(other.pinned_),
+      : kind_(other.kind_),
         data_(std::exchange(other.data_, nullptr)),
         bytes_(std::exchange(other.bytes_, 0)) {}
   RawBuffer& operator=(RawBuffer&& other) noexcept {
@@ -24,50 +37,33 @@ class RawBuffer {
     return *this;
   }
 
-  [[nodiscard]] bool pinned() const { return pinned_; }
+  [[nodiscard]] bool pinned() const { return kind_ == MemoryKind::pinned; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
-  /// Makes room for this many bytes. After a CudaError it is empty.
-  void reserve_bytes(std::size_t bytes) {
-    if (bytes <= bytes_) return;
-    release();
-    if (pinned_) {
-      check(cudaHostAlloc(&data_, bytes, cudaHostAllocDefault), "pinned memory");
-    } else {
-      check(cudaMalloc(&data_, bytes), "device memory");
-    }
-    bytes_ = bytes;
-  }
-
-  void release() noexcept {
-    if (pinned_) {
-      (void)cudaFreeHost(data_);
-    } else {
-      (void)cudaFree(data_);
-    }
-    data_ = nullptr;
-    bytes_ = 0;
-  }
+  /// Makes room for this many bytes. After a CudaError it is empty. The device must be done with
+  /// the present ones.
+  void reserve_bytes(std::size_t bytes);
+  void release() noexcept;
 
  protected:
   [[nodiscard]] void* data() const { return data_; }
   void swap(RawBuffer& other) noexcept {
-    std::swap(pinned_, other.pinned_);
+    std::swap(kind_, other.kind_);
     std::swap(data_, other.data_);
     std::swap(bytes_, other.bytes_);
   }
 
  private:
-  bool pinned_;
+  MemoryKind kind_;
   void* data_ = nullptr;
   std::size_t bytes_ = 0;
 };
 
 /// A RawBuffer of `size()` elements.
-template <class T, bool is_pinned = false>
+template <class T, MemoryKind kind>
 class Buffer : public RawBuffer {
  public:
-  Buffer() : RawBuffer(is_pinned) {}
+  Buffer() : RawBuffer(kind) {}
 
   /// Makes room for `count` elements. After a CudaError it is empty.
   void reserve(std::size_t count) { reserve_bytes(count * sizeof(T)); }
@@ -79,6 +75,6 @@ class Buffer : public RawBuffer {
 };
 
 template <class T>
-using DeviceBuffer = Buffer<T, false>;
+using DeviceBuffer = Buffer<T, MemoryKind::device>;
 
 }  // namespace catgs::cuda

@@ -47,8 +47,8 @@ class MemoryTable {
 
  protected:
   /// A row of the table. `count`: a lambda without captures, from Sizes to a number of elements.
-  template <class T, bool is_pinned>
-  class Row : public Buffer<T, is_pinned> {
+  template <class T, MemoryKind kind>
+  class Row : public Buffer<T, kind> {
    public:
     template <class Count>
     Row(MemoryTable* table, Life life, Count) {
@@ -58,9 +58,9 @@ class MemoryTable {
     }
   };
   template <class T>
-  using DeviceRow = Row<T, false>;
+  using DeviceRow = Row<T, MemoryKind::pooled>;
   template <class T>
-  using PinnedRow = Row<T, true>;
+  using PinnedRow = Row<T, MemoryKind::pinned>;
 
  private:
   struct Entry {

@@ -137,6 +137,8 @@ class Metrics {
   prometheus::Counter& tree_builds_failed =
       counter("catgs_tree_builds_failed_total", "Trees of scenes that could not be built");
   prometheus::Counter& frames_rendered = counter("catgs_frames_rendered_total", "Frames rendered");
+  prometheus::Counter& device_seconds =
+      counter("catgs_device_seconds_total", "Time that GPUs took for the frames rendered");
   prometheus::Counter& frames_refined = counter(
       "catgs_frames_refined_total", "Frames that sharpened a still picture, not rendered again");
   prometheus::Counter& frames_sent =

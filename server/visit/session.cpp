@@ -311,10 +311,12 @@ void Session::account_for(const FrameResult& result, TimePoint now) {
       .Increment();
   metrics.list_entries_overflowed.Increment(static_cast<double>(result.stats.overflowed_entries));
   const auto& stage_ms = result.stats.stage_ms;
-  const double device_s = 1e-3 * std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0);
+  const double device_s = visit_.stream().device()
+                              ? 1e-3 * std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0)
+                              : 0.0;
+  if (result.ok && !ticket.refined) metrics.device_seconds.Increment(device_s);
   const glm::dvec2 size_px = ticket.size_px, moving_px = visit_.stream().plan().moving().size_px;
-  usage_.frame_ended(ticket, visit_.stream().device() ? device_s : 0.0, now,
-                     size_px.x * size_px.y / (moving_px.x * moving_px.y));
+  usage_.frame_ended(ticket, device_s, now, size_px.x * size_px.y / (moving_px.x * moving_px.y));
 }
 
 std::string scene_pass(const VisitContext& around, const Visitor& host,

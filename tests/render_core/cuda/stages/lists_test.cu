@@ -71,7 +71,7 @@ TEST_F(SortStage, SumsTileCountsInDepthOrder) {
     const auto sums = upload(Numbers(count));
     const auto scratch = scratch_for(shape);
     const auto counts = upload(std::vector<FrameCounts>(1));
-    Buffer<HostCounts, true> host_counts;
+    Buffer<HostCounts, MemoryKind::pinned> host_counts;
     host_counts.reserve(1);
     const Stream stream;
     scan_tile_counts(count, counts.get(), host_counts.get(), ordered.get(), counted.get(),
