@@ -29,7 +29,8 @@ struct SceneEntry {
   /// What a ray meets of that which the box leaves in.
   [[nodiscard]] Picked seen_along(const Pick& ray, const ClipBox& clip) const {
     const RayPart part = kept_part(clip, ray.origin, ray.direction);
-    if (!surface || part.begin > part.end) return {ray.id, std::nullopt};
+    // Also where the part has overflowed: its bounds are infinite or not numbers.
+    if (!surface || !(part.begin < part.end)) return {ray.id, std::nullopt};
     const auto hit = surface->hit_along(ray.origin + part.begin * ray.direction, ray.direction);
     if (!hit || part.begin + hit->distance > part.end) return {ray.id, std::nullopt};
     return {ray.id, part.begin + hit->distance, hit->spread};

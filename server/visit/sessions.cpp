@@ -264,7 +264,7 @@ void Sessions::tell_positions(Session& host, TimePoint now) {
   Participants participants;
   const auto add = [&](Session& session) {
     if (const auto& camera = session.audience().tour().camera();
-        camera && participants.positions.size() < most_told_places)
+        camera && camera->view_height == 0.0f && participants.positions.size() < most_told_places)
       participants.positions.push_back(camera->world_from_camera.position);
   };
   if (tour.tells_positions()) {

@@ -46,7 +46,7 @@ TEST(WireClip, BoxesHaveAPoseAndSides) {
   const ClipBox parsed_box = parsed<ClipBox>(message);
   EXPECT_EQ(parsed_box, oriented_box({3, 0, 0}, {1, 0, 0, 0}, {2, 2, 2}));
   EXPECT_EQ(parsed_box.low, glm::vec3(1, -2, -2));
-  for (const float bad : {0.0f, -1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float bad : {0.0f, 1e-7f, -1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
     box.mutable_half_extent()->set_y(bad);
     EXPECT_EQ(wrong_field(message), "clip.box.half_extent.y");
   }
@@ -60,7 +60,7 @@ TEST(WirePose, ViewsOfParallelRaysHaveAHeight) {
   EXPECT_EQ(parsed<PoseSample>(message).view_height, 0.0f);
   pose.set_view_height(12.0f);
   EXPECT_EQ(parsed<PoseSample>(message).view_height, 12.0f);
-  for (const float bad : {-1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
+  for (const float bad : {1e-7f, -1.0f, 2e9f, std::numeric_limits<float>::quiet_NaN()}) {
     pose.set_view_height(bad);
     EXPECT_EQ(wrong_field(message), "pose.view_height");
   }

@@ -125,7 +125,8 @@ TEST(SentSidecar, AWholeTourIsTaken) {
   const Sidecar sidecar = check_sent_sidecar(
       R"({"up": "-y", "near": 0.1, "tours": [{"title": "Hall", "autoplay": true, "stops": [
           {"title": "Door", "caption": "Oak.", "position": [1, 2, 3], "orientation": [0, 0, 0, 1],
-           "fov_deg": 60, "view_height": 4, "section": [1, 2, 3, 4, 5, 6, -30], "marker": [1, 2, 4], "stay_s": 8, "fly_s": 2}]}]})");
+           "fov_deg": 60, "view_height": 4, "section": [1, 2, 3, 4, 5, 6, -30],
+           "marker": [1, 2, 4], "stay_s": 8, "fly_s": 2}]}]})");
   EXPECT_FLOAT_EQ(sidecar.near_z.value(), 0.1f);
   EXPECT_NO_THROW(check_sent_sidecar(with_stop("")));
   EXPECT_NO_THROW(check_sent_sidecar("{}"));

@@ -270,12 +270,14 @@ class SessionsTest : public testing::Test {
     }
   }
   /// A step of the visitor: acknowledgements, and another pose.
-  static void move(Visitor& visitor) {
+  /// `view_height`: of an orthographic view; 0: perspective.
+  static void move(Visitor& visitor, float view_height = 0.0f) {
     acknowledge(visitor);
     v1::ClientMessage message;
     v1::PoseSample& pose = *message.mutable_pose();
     pose.set_pose_id(++visitor.poses);
     pose.set_fov_y_rad(1.0f);
+    pose.set_view_height(view_height);
     pose.mutable_world_from_camera()->mutable_position()->set_x(static_cast<float>(visitor.poses));
     pose.mutable_world_from_camera()->mutable_orientation()->set_w(1.0f);
     say(visitor, message);

@@ -284,6 +284,17 @@ TEST_F(SharedTourTest, AllHearWhereTheyAreWhileTheLeaderWantsIt) {
   EXPECT_EQ(leader->connection->companies.size(), told.size());
 }
 
+// The camera of a plan is far above its visitor.
+TEST_F(SharedTourTest, NobodyIsToldWhereOrthographicCamerasAre) {
+  begin(false, true);
+  const auto& told = follower->connection->companies;
+  move(*leader);
+  move(*follower);
+  run_until([&] { return !told.empty() && told.back().places_size() == 2; });
+  move(*follower, 12.0f);
+  run_until([&] { return told.back().places_size() == 1; });
+}
+
 TEST_F(SharedTourTest, ANewcomerHearsAtOnceWhereTheOthersAre) {
   begin(false, true);
   move(*leader);

@@ -49,6 +49,9 @@ TEST_F(VisitTest, SaysWhatARayMeetsButNotEndlessly) {
   EXPECT_EQ(distance_in(oriented_box({0, 0, 4}, {1, 0, 0, 0}, {1, 1, 2})), 3.0f);
   EXPECT_FALSE(distance_in(oriented_box({0, 0, 1}, {1, 0, 0, 0}, {1, 1, 1}))) << "behind the box";
   EXPECT_FALSE(distance_in(oriented_box({5, 0, 3}, {1, 0, 0, 0}, {1, 1, 1}))) << "beside the box";
+  session.on_message(oriented_box({}, {1, 0, 0, 0}, {1, 1, 1}), now);
+  session.on_message(Pick{8, {0.0f, -11.0f, 0.0f}, {1.0f, 1e-38f, 0.0f}}, now);
+  EXPECT_FALSE(std::get<Picked>(host.said.back()).distance) << "as good as beside it";
   for (std::uint32_t id = 10; id < 100; ++id)
     session.on_message(Pick{id, {}, {0.0f, 0.0f, 1.0f}}, now);
   EXPECT_EQ(host.count<Picked>(), 32);
