@@ -132,7 +132,6 @@ void RateController::back_off(const Sample& sample, TimePoint now) {
   if (!passed) return;
   capacity_ = passed_when_busy_ = *passed;
   last_back_off_ = now;
-  least_delay_us_ = {};  // delays become shorter because of this
   const double before = rate_;
   rate_ = std::min(rate_, *passed * (queue_ > long_queue ? long_queue_share : back_off_share));
   if (rate_ < before && std::exchange(regains_, false))

@@ -27,8 +27,9 @@ namespace catgs {
 /// - After a second without samples, the capacity may have changed unseen. If the path has carried
 ///   more than the present rate, the rate then grows very fast, up to what it has carried, until
 ///   something queues. An attempt that fails makes the next one shorter.
-/// - When delays become shorter than in the last second, and there was no back-off meanwhile, the
-///   capacity has grown: it is unknown again.
+/// - When delays become shorter than in the last second, the capacity may have grown: it is unknown
+///   again. So it is when a back-off has emptied a queue. To wait for a second after each back-off
+///   left 81 % of the rate 2 s after a link was back, instead of 90 %.
 /// - A stall, such as TCP's after a burst of losses, does not lower the capacity. A gap longer than
 ///   all others together is left out of the delivered rate.
 /// - After five back-offs in a row without a shorter queue, the path has become longer or is filled
