@@ -31,13 +31,24 @@ const without_unused = (code: string): string =>
     return ` boot(${JSON.stringify(JSON.parse(description), used)});`;
   });
 
+// Captions disable these parts of Markdown by name (captions/markdown.ts), so that nothing runs them.
+const disabled_part =
+  /micromark-core-commonmark\/lib\/(html-flow|html-text|definition|code-indented)\.js$/;
+const named_part = (file: string): string => {
+  const name = file.replace(/-(\w)/, (_, letter: string) => letter.toUpperCase());
+  return `export const ${name} = { name: '${name}' };`;
+};
+
 /** Makes files smaller than minifying does. */
 const smaller: Plugin = {
   name: 'smaller',
-  transform: (code, file) =>
-    file.includes('@bufbuild/protobuf')
+  transform: (code, file) => {
+    const [, disabled] = disabled_part.exec(file) ?? [];
+    if (disabled) return { code: named_part(disabled), map: null };
+    return file.includes('@bufbuild/protobuf')
       ? { code: without_unused(unused_enums(code)), map: null }
-      : null,
+      : null;
+  },
   // Names of private members end so, and no others do.
   renderChunk: (code, { fileName }) =>
     transformWithEsbuild(code, fileName, { mangleProps: /[^_]_$/, loader: 'js' }),

@@ -159,6 +159,18 @@ describe('plan and elevations', () => {
     expect(await view_height(page)).toBeUndefined();
     await page.locator('#button-share').click();
     expect(await page.locator('#share-link').inputValue()).not.toContain('section');
+    await open_views(page);
+    const play = page.locator('#tour-play');
+    for (const take_over of ['Plan', 'Section box', 'Turn'] as const) {
+      await play.click();
+      await expect.poll(() => play.getAttribute('aria-label')).toMatch(/^Pause/);
+      if (take_over === 'Plan') await choose(page, take_over);
+      else if (take_over === 'Turn') await page.getByRole('slider', { name: 'Turn' }).fill('20');
+      else await page.getByLabel('Section box', { exact: true }).check();
+      await expect.poll(() => play.getAttribute('aria-label')).toMatch(/^Play/);
+    }
+    await page.getByRole('button', { name: /Reset the box/ }).click();
+    expect(await page.getByRole('slider', { name: 'Turn' }).inputValue()).toBe('0');
     expect(errors).toEqual([]);
   });
 });

@@ -6,7 +6,7 @@ import { save_sidecar, type SaveResult, type SidecarTag } from '#client/tour/sav
 import { read_tours, type Stop, type Tour } from '#client/tour/tour';
 import { texts_written } from '#client/text/translations';
 import { untranslated } from '#client/tour/words';
-import { scene } from './cameras';
+import { expect_vec, scene } from './cameras';
 import { FakeTime } from './fakes';
 
 const stop = (title: string): Stop => ({
@@ -158,6 +158,16 @@ describe('a draft of a tour', () => {
       translations: { de: { title: 'Halle' } },
     });
     const start_pose = { ...scene.start_pose, position: [7, 7, 7] as const };
+    const section = [1, 2, 3, 4, 5, 6, 30];
+    draft.change(0, { section });
+    const over = { ...scene, up: [0, 1, 0] as const };
+    for (const [own_up, turn_deg] of [
+      [undefined, 30],
+      [scene.up, -30], // the author has turned the scene over
+    ] as const) {
+      const [tour] = (draft.sidecar(over, own_up) as { tours: { stops: Partial<Stop>[] }[] }).tours;
+      expect_vec(tour!.stops[0]!.section!, [...section.slice(0, 6), turn_deg]);
+    }
     const sidecar = draft.sidecar({
       ...scene,
       start_pose,

@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { Signal } from '#client/base/signal';
-import { conjugate, dot, rotate, sub, type Vec3 } from '#client/base/vector';
+import { conjugate, dot, identity, rotate, sub, type Vec3 } from '#client/base/vector';
+import type { Eye } from '#client/camera/eye';
 import type { CameraMode } from '#client/camera/mode';
 import { Dollhouse } from '#client/walkable_area/dollhouse';
 import { GestureRouter } from '#client/page/gestures';
@@ -170,6 +171,27 @@ describe('a visitor of the dollhouse', () => {
     expect(made.mode).toBe('fly');
     expect(made.pose.position).toEqual(from);
     expect(made.within([99, 0, 0])).toEqual([20, 0, 0]);
+  });
+
+  it('is no way back from an orthographic view', () => {
+    const plan: Eye = {
+      position: [0, -99, 0],
+      orientation: identity,
+      fov_y_rad: 1,
+      view_height: 8,
+    };
+    const { house, made, before } = enter();
+    house.led_away();
+    made.jump(plan);
+    made.leave_orthographic();
+    expect_vec(made.pose.position, before.position);
+    made.jump(plan);
+    house.show(0);
+    made.step(0.016);
+    house.leave();
+    made.step(0.016);
+    expect(made.is_orthographic).toBe(false);
+    expect_vec(made.pose.position, before.position);
   });
 
   it('keeps the mode that they chose there', () => {

@@ -11,7 +11,7 @@ import type { MeasureList } from '../tour/measure_list';
 import { without, type Measure } from '../tour/measures';
 import type { TourPlayer } from '../tour/player';
 import { save_sidecar, type SidecarTag } from '../tour/save';
-import { tours_for, type Tour } from '../tour/tour';
+import { tours_for, type Stop, type Tour } from '../tour/tour';
 import { untranslated, worded, words_for } from '../tour/words';
 import { AuthorAbout, no_scene_words } from './about';
 import type { FilmPanel } from './film_panel';
@@ -22,6 +22,8 @@ import { AuthorStops, type MediaFields, type StopActions } from './stops';
 interface AuthorTools extends Pick<PageParts, 'navigation' | 'clipping'> {
   readonly player: TourPlayer;
   readonly preview: Preview;
+  /** What is drawn, as stops have it. */
+  section(): Stop['section'];
   /** The scenes that this author may see. */
   scenes(): Promise<readonly SceneListing[]>;
   /** The tours have changed. `edited`: index of the one that is edited; -1: it has no stops. */
@@ -188,7 +190,7 @@ export class AuthorPanel {
     on_click('author-add', () => void this.add());
     tools.measures.changed.listen((field) => this.measured(field));
     on_click('author-start', () => {
-      draft.edit({ start: tools.navigation.eye });
+      draft.edit({ start: tools.navigation.camera.perspective_eye });
       this.told();
       this.say(text.author.start_set);
     });
@@ -235,7 +237,7 @@ export class AuthorPanel {
 
   private async add(): Promise<void> {
     const { eye } = this.tools_.navigation;
-    const { section } = this.tools_.clipping;
+    const section = this.tools_.section();
     const { edited } = this.draft_.state;
     const { scene_id_: scene_id } = this;
     const marker = await this.point_ahead();
@@ -262,7 +264,7 @@ export class AuthorPanel {
 
   private async take_view(index: number): Promise<void> {
     const { eye } = this.tools_.navigation;
-    const { section } = this.tools_.clipping;
+    const section = this.tools_.section();
     const stop = this.draft_.stops[index];
     const marker = await this.point_ahead();
     const at = this.draft_.stops.findIndex((other) => other === stop); // it may have moved meanwhile
@@ -290,8 +292,9 @@ export class AuthorPanel {
   /** Undefined: there is no scene, or a description is missing, and the author is led to its field. */
   private sidecar(): string | undefined {
     if (this.asks_description()) return undefined;
-    const { scene } = this.tools_.navigation.camera;
-    return scene && `${JSON.stringify(this.draft_.sidecar(scene), undefined, 2)}\n`;
+    const { camera, own_up } = this.tools_.navigation;
+    const { scene } = camera;
+    return scene && `${JSON.stringify(this.draft_.sidecar(scene, own_up), undefined, 2)}\n`;
   }
 
   private asks_description(): boolean {

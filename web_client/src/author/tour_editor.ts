@@ -1,5 +1,6 @@
 // The author's editor in the page: what it edits is shown and played at once.
 import type { Eye } from '../camera/eye';
+import { section_about } from '../camera/upright_box';
 import type { PageParts } from '../page/parts';
 import type { SceneListing } from '../session/scenes';
 import type { SceneAbout } from '../tour/draft';
@@ -38,6 +39,8 @@ export class TourEditor {
     this.panel_ = new AuthorPanel({
       navigation,
       clipping,
+      section: () =>
+        clipping.section && section_about(clipping.section, camera.up, navigation.own_up),
       player,
       preview,
       scenes,

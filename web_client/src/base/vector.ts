@@ -24,6 +24,9 @@ export const cross = (a: Vec3, b: Vec3): Vec3 => [
 export const short_coordinate = (v: number, digits: number): number =>
   Number(Math.abs(v) < 1000 ? v.toPrecision(digits) : v.toFixed(4));
 
+export const clamp = (value: number, low: number, high: number): number =>
+  Math.min(high, Math.max(low, value));
+
 export const same = (a: Vec3, b: Vec3): boolean => a.every((v, i) => v === b[i]);
 
 /** Returns `fallback` where `a` has no direction. */

@@ -11,6 +11,7 @@ import {
   scale,
   unit,
   type Vec3,
+  clamp,
 } from '../base/vector';
 import { CameraRig, default_fov_y_rad } from './camera_rig';
 import { ClearPath, type AskDistance } from './clear_path';
@@ -48,7 +49,7 @@ export class CameraController {
   private scene_: SceneSetup | undefined;
   private speed_ = 1;
   private settled_ = true;
-  private before_: Eye | undefined; // the orthographic view
+  private before_: { eye: Eye; distance: number } | undefined; // the orthographic view
   private flight_: { way: Flight; time_s: number; ended: (arrived: boolean) => void } | undefined;
 
   /** Time constant of the glide after a gesture. 0 turns it off, for people who asked for reduced motion. */
@@ -77,7 +78,15 @@ export class CameraController {
 
   /** Back to where the camera was before an orthographic view. */
   leave_orthographic(): void {
-    if (this.is_orthographic) this.jump(this.before_ ?? this.start ?? this.pose);
+    if (!this.is_orthographic || !this.before_) return;
+    const { eye, distance } = this.before_;
+    this.jump(eye);
+    this.rig_.look_ahead(distance);
+  }
+
+  /** Where leave_orthographic() leads. */
+  get perspective_eye(): Eye {
+    return (this.is_orthographic && this.before_?.eye) || this.eye;
   }
 
   /** The scene's scale to a visitor, world units. */
@@ -95,7 +104,7 @@ export class CameraController {
   }
 
   set speed(factor: number) {
-    this.speed_ = Math.min(fastest, Math.max(1 / fastest, factor));
+    this.speed_ = clamp(factor, 1 / fastest, fastest);
   }
 
   /** From the eye to what the visitor looks at, world units; Infinity: unknown. */
@@ -326,7 +335,8 @@ export class CameraController {
   }
 
   private see({ position, orientation, fov_y_rad, view_height }: Pose & Partial<Eye>): void {
-    if (view_height && !this.is_orthographic) this.before_ = this.eye;
+    if (view_height && !this.is_orthographic)
+      this.before_ = { eye: this.eye, distance: this.rig_.distance() };
     this.rig_.pose = { position, orientation };
     this.rig_.view_height = view_height;
     if (fov_y_rad) this.fov_y_rad = fov_y_rad;
@@ -359,8 +369,8 @@ export class CameraController {
   private turn(yaw: number, pitch: number): void {
     if (yaw !== 0) this.controller.turn(axis_angle(this.up, yaw));
     if (pitch === 0) return;
-    const elevation = Math.asin(Math.min(1, Math.max(-1, dot(this.rig_.view, this.up))));
-    const target = Math.min(Math.max(elevation + pitch, -steepest_rad), steepest_rad);
+    const elevation = Math.asin(clamp(dot(this.rig_.view, this.up), -1, 1));
+    const target = clamp(elevation + pitch, -steepest_rad, steepest_rad);
     const allowed = target - elevation;
     // A start pose may look straight down, beyond the limit. From there only the way back is open.
     if (allowed * pitch <= 0) return;

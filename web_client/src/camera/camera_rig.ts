@@ -16,6 +16,7 @@ import {
   sub,
   unit,
   type Vec3,
+  clamp,
 } from '../base/vector';
 import { limited_fov, type Eye, type Pose } from './eye';
 import type { SceneSetup } from './scene_setup';
@@ -171,7 +172,7 @@ export class CameraRig {
   facing(point: Vec3): Eye {
     const away = sub(this.pose.position, point);
     const distance = Math.max(length(away), 1e-9);
-    const nearer = Math.min(distance, Math.max(distance * 0.67, this.nearest * 4));
+    const nearer = clamp(this.nearest * 4, distance * 0.67, distance);
     const position = this.within(add(point, scale(away, nearer / distance)));
     return { position, orientation: look_at(position, point, this.up), fov_y_rad: this.fov_y_rad };
   }

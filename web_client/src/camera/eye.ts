@@ -1,5 +1,5 @@
 // Cameras as data. Every part of the client that handles cameras uses these types.
-import type { Quat, Vec3 } from '../base/vector';
+import { clamp, type Quat, type Vec3 } from '../base/vector';
 
 /** Camera axes: x right, y down, z forward. World units. */
 export interface Pose {
@@ -17,6 +17,10 @@ export interface Eye extends Pose {
 /** Half of the view's height at depth 1; at any depth where rays are parallel. World units. */
 export const half_height = ({ fov_y_rad, view_height }: Eye): number =>
   view_height === undefined ? Math.tan(fov_y_rad / 2) : view_height / 2;
+
+/** Half of the view's height at this depth. World units. */
+export const half_height_at = (eye: Eye, depth: number): number =>
+  half_height(eye) * (eye.view_height === undefined ? depth : 1);
 
 export const same_projection = (a: Eye, b: Eye): boolean =>
   (a.view_height === undefined) === (b.view_height === undefined);
@@ -46,19 +50,21 @@ export interface CameraSample {
   readonly at_rest?: boolean;
 }
 
-/** Range of the wire (proto/catgs.proto). */
+/** Ranges of the wire (proto/catgs.proto). */
 const fov_range_rad = [0.1, 2.8] as const;
+const height_range = [1e-6, 1e9] as const;
 
-export const limited_fov = (fov_y_rad: number): number =>
-  Math.min(fov_range_rad[1], Math.max(fov_range_rad[0], fov_y_rad));
+export const limited_fov = (fov_y_rad: number): number => clamp(fov_y_rad, ...fov_range_rad);
+
+export const limited_height = (view_height: number): number => clamp(view_height, ...height_range);
 
 /** Field of view whose image plane is `factor` times as large, limited to the range of the wire. */
 export const widened_fov = (fov_y_rad: number, factor: number): number =>
   limited_fov(2 * Math.atan(Math.tan(fov_y_rad / 2) * factor));
 
-/** The eye with a view `factor` times as high. */
+/** The eye with a view `factor` times as high, limited to the ranges of the wire. */
 export const widened = (eye: Eye, factor: number): Eye => ({
   ...eye,
   fov_y_rad: widened_fov(eye.fov_y_rad, factor),
-  view_height: eye.view_height && eye.view_height * factor,
+  view_height: eye.view_height && limited_height(eye.view_height * factor),
 });

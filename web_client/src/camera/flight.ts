@@ -1,5 +1,5 @@
 // Camera movements that are known in advance. Pure.
-import { add, angle_between, length, scale, slerp, sub } from '../base/vector';
+import { add, angle_between, length, scale, slerp, sub, clamp } from '../base/vector';
 import { same_projection, type Eye } from './eye';
 
 export interface Flight {
@@ -35,20 +35,23 @@ export function path_of(
 
 /** Maps 0…1 to 0…1 with zero velocity and acceleration at both ends (Perlin's smootherstep). */
 function eased(share: number): number {
-  const s = Math.min(1, Math.max(0, share));
+  const s = clamp(share, 0, 1);
   return s * s * s * (s * (6 * s - 15) + 10);
 }
 
-/** The camera at a share of the straight way. */
-export const between = (from: Eye, to: Eye, share: number): Eye => ({
-  position: add(from.position, scale(sub(to.position, from.position), share)),
-  orientation: slerp(from.orientation, to.orientation, share),
-  fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
-  view_height:
-    from.view_height && to.view_height
-      ? from.view_height * (to.view_height / from.view_height) ** share
-      : to.view_height,
-});
+/** The camera at a share of the straight way; at its end where perspective becomes orthographic, or back. */
+export function between(from: Eye, to: Eye, share: number): Eye {
+  if (!same_projection(from, to)) return to;
+  return {
+    position: add(from.position, scale(sub(to.position, from.position), share)),
+    orientation: slerp(from.orientation, to.orientation, share),
+    fov_y_rad: from.fov_y_rad + (to.fov_y_rad - from.fov_y_rad) * share,
+    view_height:
+      from.view_height &&
+      to.view_height &&
+      from.view_height * (to.view_height / from.view_height) ** share,
+  };
+}
 
 /** At once where perspective becomes orthographic, or back: nothing lies between. */
 export function glide(from: Eye, to: Eye, wanted_s: number): Flight {
@@ -82,5 +85,5 @@ const time_range_s = [0.6, 6] as const;
 export function glide_time_s(from: Eye, to: Eye, reach: number): number {
   const turn_s = angle_between(from.orientation, to.orientation) / comfortable_rad_per_s;
   const way_s = length(sub(to.position, from.position)) / (reach * comfortable_reach_per_s);
-  return Math.min(time_range_s[1], Math.max(time_range_s[0], turn_s, way_s));
+  return clamp(Math.max(turn_s, way_s), ...time_range_s);
 }

@@ -1,4 +1,5 @@
 // What pointers, wheels, keys and sticks ask of a camera.
+import { clamp } from '../base/vector';
 
 /** One movement of a pointer or wheel. Distances are fractions of the view's height, y down. */
 export type Gesture =
@@ -31,7 +32,7 @@ export function sum_of(...held: readonly Partial<Axes>[]): Axes {
   const sum = { ...no_axes, fast: held.some(({ fast }) => fast) };
   for (const direction of directions) {
     const total = held.reduce((so_far, axes) => so_far + (axes[direction] ?? 0), 0);
-    sum[direction] = Math.min(1, Math.max(-1, total));
+    sum[direction] = clamp(total, -1, 1);
   }
   return sum;
 }

@@ -1,6 +1,6 @@
-import { add, dot, length, scale, sub, type Vec3 } from '../base/vector';
+import { add, dot, length, scale, sub, type Vec3, clamp } from '../base/vector';
 import type { CameraRig } from './camera_rig';
-import type { Eye } from './eye';
+import { limited_height, type Eye } from './eye';
 import type { ModeController } from './mode';
 import type { Axes, Gesture } from './movement';
 import type { Movement } from './smoothing';
@@ -58,7 +58,7 @@ export class OrthographicController implements ModeController {
     const { view_height = 1, reach } = this.rig_;
     const [least, most] = height_range;
     const wanted = view_height * (1 - zoom_share) ** steps;
-    this.rig_.view_height = Math.min(most * reach, Math.max(least * reach, wanted));
+    this.rig_.view_height = limited_height(clamp(wanted, least * reach, most * reach));
   }
 
   /** The point comes to the middle of the view. */

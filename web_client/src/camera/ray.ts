@@ -12,7 +12,7 @@ import {
   sub,
   type Vec3,
 } from '../base/vector';
-import { half_height, type Eye } from './eye';
+import { half_height, half_height_at, type Eye } from './eye';
 
 export interface Ray {
   readonly origin: Vec3;
@@ -37,15 +37,14 @@ export function project(
 ): readonly [number, number] | undefined {
   const [x, y, z] = rotate(conjugate(eye.orientation), sub(point, eye.position));
   if (z <= 1e-6) return undefined;
-  const half = half_height(eye) * (eye.view_height === undefined ? z : 1);
+  const half = half_height_at(eye, z);
   return [0.5 + x / half / aspect / 2, 0.5 + y / half / 2];
 }
 
 /** Side of a pixel at a point of the scene, where the view has so many rows. */
 export function pixel_at(point: Vec3, eye: Eye, height_px: number): number {
   const depth = dot(sub(point, eye.position), rotate(eye.orientation, forward));
-  const half = half_height(eye) * (eye.view_height === undefined ? depth : 1);
-  return (2 * half) / Math.max(1, height_px);
+  return (2 * half_height_at(eye, depth)) / Math.max(1, height_px);
 }
 
 type ViewPoint = readonly [x: number, y: number];

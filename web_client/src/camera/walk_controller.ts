@@ -1,4 +1,15 @@
-import { add, dot, length, look_at, normalize, same, scale, sub, type Vec3 } from '../base/vector';
+import {
+  add,
+  dot,
+  length,
+  look_at,
+  normalize,
+  same,
+  scale,
+  sub,
+  type Vec3,
+  clamp,
+} from '../base/vector';
 import type { Eye } from './eye';
 import { FlyController } from './fly_controller';
 import type { Walker } from './walker';
@@ -47,7 +58,7 @@ export class WalkController extends FlyController {
   /** With the eyes there, and the view about level. */
   standing(position: Vec3): Eye {
     const { rig } = this;
-    const rise = Math.min(Math.max(dot(rig.view, rig.up), -steepest_sine), steepest_sine);
+    const rise = clamp(dot(rig.view, rig.up), -steepest_sine, steepest_sine);
     const ahead = add(scale(this.heading, Math.sqrt(1 - rise * rise)), scale(rig.up, rise));
     return {
       position,

@@ -1,5 +1,6 @@
 // From received bytes to the picture that is shown: decoder, newest-wins slot, presenter, and one
 // acknowledgement per frame, whatever became of it. Each step has a longest time.
+import { clamp } from '../base/vector';
 import type { Timers } from '../base/clock';
 import { after_awake, in_time, longest_step_s } from '../base/patience';
 import { Codec, type AckInit, type FrameHeader, type StreamConfig } from '../wire/wire';
@@ -254,7 +255,7 @@ export class FramePipeline {
       decodedUs: BigInt(frame.decoded_us),
       presentedUs: BigInt(presented_us),
       dropped: presented_us === 0,
-      poseAgeUs: presented_us === 0 ? 0 : Math.min(Math.max(age_us, 0), 0xffffffff),
+      poseAgeUs: presented_us === 0 ? 0 : clamp(age_us, 0, 0xffffffff),
     });
   }
 }

@@ -1,3 +1,4 @@
+import { clamp } from '../base/vector';
 import type { Timers } from '../base/clock';
 import type { Gesture } from '../camera/movement';
 
@@ -174,5 +175,5 @@ export function wheel_steps(delta_y: number, delta_mode: number, ctrl: boolean):
   const px = delta_y * px_per_unit;
   const is_pinch = ctrl && Math.abs(px) < longest_pinch_px;
   const steps = (-px * (is_pinch ? pinch_factor : 1)) / wheel_px_per_step;
-  return Math.min(8, Math.max(-8, steps));
+  return clamp(steps, -8, 8);
 }

@@ -1,4 +1,5 @@
 // Lengths and areas as visitors write them.
+import { clamp } from '../base/vector';
 import type { KeptTexts } from '../base/browser_storage';
 import { number } from '../text/number';
 import { locale } from '../text/text';
@@ -83,7 +84,7 @@ function writer(
   const [factor, sign] = unit_for(value, scale, power);
   const [of, count] = error > 0 ? [error, digits] : [Math.abs(value), 3];
   const first = Math.floor(Math.log10(Math.max(of * factor, 1e-6)));
-  const decimals = Math.min(6, Math.max(0, count - 1 - first));
+  const decimals = clamp(count - 1 - first, 0, 6);
   const options = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
   return (amount) => `${number(amount * factor, options).replace('-', '−')}${sign}`;
 }

@@ -46,6 +46,8 @@ export class Navigation {
   readonly sampled = new Signal<CameraSample>();
   readonly pad_pressed = new Signal<GamepadAction>();
   readonly gestures = new GestureRouter();
+  /** The scene's own (unit), whatever the visitor has chosen. */
+  own_up: Vec3 = [0, -1, 0];
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
   private readonly chosen_ups_ = new Map<string, Vec3>();
@@ -130,6 +132,8 @@ export class Navigation {
 
   /** Back to where the camera was before an orthographic view. */
   leave_orthographic(): void {
+    if (!this.camera.is_orthographic) return;
+    this.taken_over.emit();
     this.camera.leave_orthographic();
     this.moved();
   }
@@ -221,11 +225,12 @@ export class Navigation {
 
   /** Who walks from now on. The camera stays where it is. */
   set_walker(walker: Walker): void {
-    if (this.looks_by_default && walker.stand_near(this.eye.position)) {
+    const { looks_by_default: looks, camera } = this;
+    if (looks && !camera.is_orthographic && walker.stand_near(this.eye.position)) {
       this.set_mode('walk');
       this.default_mode_ = 'any';
     }
-    this.camera.walker = walker;
+    camera.walker = walker;
   }
 
   /** A walking visitor comes to stand where their eyes are here. */
@@ -324,6 +329,7 @@ export class Navigation {
     this.scene_id_ = scene.sceneId;
     this.camera.walker = undefined;
     this.camera.load(scene_setup(scene));
+    this.own_up = this.camera.up;
     const up = this.chosen_up;
     if (up) {
       this.camera.set_up(up);

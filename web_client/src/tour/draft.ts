@@ -1,7 +1,9 @@
 // What an author is editing: the tours and what the scene's sidecar says besides. Pure.
+import { normalize, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { CameraMode } from '../camera/mode';
 import type { SceneSetup } from '../camera/scene_setup';
+import { section_about } from '../camera/upright_box';
 import { write_translations, type Translations } from '../text/translations';
 import { write_measures, type Measure } from './measures';
 import { write_tours, type Stop, type Tour } from './tour';
@@ -174,8 +176,8 @@ export class TourDraft {
     this.edit_tour({ stops: swapped });
   }
 
-  /** The whole of `<scene>.json`: the facts of the scene and the tours. */
-  sidecar(scene: SceneSetup): object {
+  /** The whole of `<scene>.json`: the facts of the scene and the tours. `own_up`: what sections are about here. */
+  sidecar(scene: SceneSetup, own_up = scene.up): object {
     const limited = scene.limits_max.some((v, i) => v > scene.limits_min[i]!);
     const { title, credits, translations, licence, mode, background, metres_per_unit } =
       this.state.about;
@@ -194,13 +196,23 @@ export class TourDraft {
       near: scene.near_z,
       ...(limited && { limits: { min: scene.limits_min, max: scene.limits_max } }),
       focus: scene.focus,
-      tours: write_tours(this.shown),
+      tours: write_tours(
+        this.shown.map((tour) => about_up(tour, own_up, normalize(scene.up, own_up))),
+      ),
       ...(measures.length > 0 && { measures }),
     };
   }
 }
 
 const is_shown = ({ stops, way }: Tour): boolean => stops.length > 0 || way !== undefined;
+
+const about_up = (tour: Tour, from: Vec3, to: Vec3): Tour => ({
+  ...tour,
+  stops: tour.stops.map((stop) => ({
+    ...stop,
+    section: stop.section && section_about(stop.section, from, to),
+  })),
+});
 
 /** Edits the first tour that is no film, or a new one. */
 function first_of(tours: readonly Tour[]): Pick<DraftState, 'tours' | 'edited'> {

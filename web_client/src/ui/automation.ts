@@ -113,13 +113,17 @@ export function make_automation(
  * Whether the shown picture is that of the present camera. The server does not render a pose again that
  * gives the same picture, so the id of the newest pose may never come back.
  */
-function shows_camera(shown: Shown, camera: CameraController, newest_pose_id: number): boolean {
+export function shows_camera(
+  shown: Pick<Shown, 'pose_id' | 'eye'>,
+  camera: Pick<CameraController, 'eye' | 'scene'>,
+  newest_pose_id: number,
+): boolean {
   if (shown.pose_id >= newest_pose_id) return true;
   const { eye } = camera;
   const [a, b] = [half_height(shown.eye), half_height(eye)];
   return (
     same_projection(shown.eye, eye) &&
-    Math.abs(a - b) < same_angle_rad * Math.max(1, b) &&
+    Math.abs(a - b) < same_angle_rad * (eye.view_height === undefined ? Math.max(1, b) : b) &&
     same_view(shown.eye, eye, camera.scene)
   );
 }

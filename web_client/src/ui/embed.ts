@@ -20,6 +20,7 @@ type EmbedNews =
       readonly position: readonly number[];
       readonly orientation: readonly number[];
       readonly fov_deg: number;
+      readonly view_height: number | undefined;
     };
 
 export class EmbedApi {
@@ -83,11 +84,13 @@ export class EmbedApi {
       position: message.at('position').vec3(),
       orientation: message.at('orientation').orientation(),
       fov_y_rad: message.find('fov_deg')?.fov_rad() ?? this.target_.navigation.eye.fov_y_rad,
+      view_height: message.find('view_height')?.number(1e-6),
     });
   }
 
   private tell_pose(): void {
-    const { position, orientation, fov_y_rad } = this.target_.navigation.eye;
-    this.say({ catgs: 'pose', position, orientation, fov_deg: (fov_y_rad * 180) / Math.PI });
+    const { position, orientation, fov_y_rad, view_height } = this.target_.navigation.eye;
+    const fov_deg = (fov_y_rad * 180) / Math.PI;
+    this.say({ catgs: 'pose', position, orientation, fov_deg, view_height });
   }
 }

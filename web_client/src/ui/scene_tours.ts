@@ -43,7 +43,7 @@ export class SceneTours {
         timers: browser_timers,
         now_us: () => clock.now_us(),
         announce: (samples) => worker.post({ kind: 'path', samples }),
-        show_section: (section) => (clipping.section = section),
+        show_section: (section) => clipping.show(section),
         reached: (tour, stop) => {
           // Imported tours may be longer than those that the wire can tell of.
           if (tour < max_tours && stop < max_stops) worker.post({ kind: 'reached', tour, stop });

@@ -2,7 +2,14 @@
 import { add, dot, forward, rotate, scale, sub, type Vec3 } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { project, visible_part } from '../camera/ray';
-import { box_of, section_of_box, upright_axes, type UprightBox } from '../camera/upright_box';
+import {
+  box_of,
+  least_side,
+  limited_side,
+  section_of_box,
+  upright_axes,
+  type UprightBox,
+} from '../camera/upright_box';
 import { written_on_line, type Scale } from '../measure/units';
 import { make } from '../page/dom';
 import type { PageParts } from '../page/parts';
@@ -28,7 +35,6 @@ const steps: Readonly<Record<string, number>> = {
 };
 const key_step_px = 8;
 const least_px = 0.12; // that a side moves in the picture, over what it would at a right angle
-const least_share = 1e-3; // of the scene's scale: no side is shorter
 
 type Point = readonly [x: number, y: number];
 
@@ -40,7 +46,7 @@ export function with_side(
   up: Vec3,
   least: number,
 ): UprightBox {
-  const length = Math.max(least, box.size[axis] + by);
+  const length = limited_side(Math.max(least, box.size[axis] + by));
   const moved = (sign * (length - box.size[axis])) / 2;
   const along = upright_axes(up, box.turn_rad)[axis];
   const size = box.size.map((v, i) => (i === axis ? length : v)) as unknown as Vec3;
@@ -136,8 +142,8 @@ export class SectionBox {
     const square = x * x + y * y;
     if (!(square > 0)) return;
     const by = (by_px[0] * x + by_px[1] * y) / square;
-    const least = least_share * navigation.reach;
-    clipping.section = section_of_box(with_side(box, side, by, this.up, least));
+    const least = least_side(navigation.reach);
+    clipping.edit(section_of_box(with_side(box, side, by, this.up, least)));
   }
 
   private make_handle(side: Side): HTMLElement {

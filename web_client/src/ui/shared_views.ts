@@ -30,7 +30,8 @@ export class SharedViews {
     if (up) this.parts_.navigation.choose_up(up);
     if (mode) this.parts_.navigation.set_mode(mode);
     if (!eye) return;
-    this.parts_.clipping.section = section;
+    if (up) this.parts_.clipping.section = section;
+    else this.parts_.clipping.show(section);
     this.player_.pause();
     this.put(eye);
   }

@@ -4,12 +4,13 @@ import {
   elevation_of,
   elevations,
   extent_along,
+  room_before,
   type Elevation,
 } from '../camera/elevation';
 import { add, dot, forward, rotate, scale, sub } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import { OrthographicController } from '../camera/orthographic_controller';
-import { box_of, section_of_box, upright_axes, type UprightBox } from '../camera/upright_box';
+import { box_around, box_of, section_of_box, type UprightBox } from '../camera/upright_box';
 import { kept_system, type Scale } from '../measure/units';
 import { by_id, make } from '../page/dom';
 import type { PageParts } from '../page/parts';
@@ -26,7 +27,6 @@ interface ViewsParts extends PageParts {
 }
 
 const half_without_content = 3; // half the side of the box where the content is not known, in the scene's scales
-const stray_share = 0.1; // floors and outer walls lie at the ends of the content
 const degrees = 180 / Math.PI;
 
 export class ViewsPanel {
@@ -63,7 +63,11 @@ export class ViewsPanel {
       if (panel === 'views' && shown) this.edits_ = true;
       if (panel === 'views' || panel === 'measure') this.draw(this.eye_);
     });
-    navigation.entered.listen(() => (this.edits_ = !this.panel_.hidden));
+    navigation.entered.listen(() => {
+      this.edits_ = !this.panel_.hidden;
+      this.turn_rad_ = 0;
+      this.show_fields();
+    });
     navigation.camera.load_orthographic((rig) => new OrthographicController(rig));
     window.addEventListener('resize', () => this.draw(this.eye_));
     this.show_fields();
@@ -80,6 +84,10 @@ export class ViewsPanel {
     return { metres_per_unit: measures.metres_per_unit, system: kept_system(storage) };
   }
 
+  private get near_z(): number {
+    return this.parts_.navigation.camera.scene?.near_z ?? 0;
+  }
+
   private view_buttons(): HTMLElement {
     const made = (['perspective', ...elevations] as const).map((name) => {
       const button = make('button', { type: 'button' }, text.views[name]);
@@ -93,9 +101,12 @@ export class ViewsPanel {
   private section_fields(): HTMLElement {
     const { clipping } = this.parts_;
     this.section_.addEventListener('change', () => {
-      clipping.section = this.section_.checked ? section_of_box(this.whole()) : undefined;
+      clipping.edit(this.section_.checked ? section_of_box(this.whole()) : undefined);
     });
-    this.reset_.addEventListener('click', () => (clipping.section = section_of_box(this.whole())));
+    this.reset_.addEventListener('click', () => {
+      this.turn_to(0);
+      clipping.edit(section_of_box(this.whole()));
+    });
     this.turn_.addEventListener('input', () => this.turn_to(Number(this.turn_.value) / degrees));
     return make(
       'fieldset',
@@ -111,16 +122,10 @@ export class ViewsPanel {
   /** The box that a section begins with, and that elevations show without one. */
   private whole(): UprightBox {
     const { camera } = this.parts_.navigation;
-    const turn_rad = this.turn_rad_;
     const { content, focus } = camera.scene ?? no_scene;
     const half = scale([1, 1, 1], half_without_content * camera.reach);
     const { min, max } = content ?? { min: sub(focus, half), max: add(focus, half) };
-    // Along axes of the world, and as large in those of the turned box.
-    const [width, depth, height] = upright_axes(camera.up, turn_rad).map((axis) =>
-      axis.reduce((sum, v, i) => sum + Math.abs(v) * (max[i]! - min[i]!), 0),
-    );
-    const size = scale([width!, depth!, height!], 1 + stray_share);
-    return { centre: scale(add(min, max), 0.5), size, turn_rad };
+    return box_around({ min, max }, camera.up, this.turn_rad_, camera.reach);
   }
 
   private choose(name: Elevation | 'perspective'): void {
@@ -128,7 +133,9 @@ export class ViewsPanel {
     if (name === 'perspective') return navigation.leave_orthographic();
     const { up, fov_y_rad } = navigation.camera;
     const aspect = view.clientWidth / Math.max(1, view.clientHeight);
-    navigation.put(elevation_eye(name, this.section ?? this.whole(), up, aspect, fov_y_rad));
+    const box = this.section ?? this.whole();
+    navigation.taken_over.emit();
+    navigation.put(elevation_eye(name, box, up, aspect, fov_y_rad, this.near_z));
   }
 
   /** The elevation that is shown turns along. */
@@ -136,7 +143,7 @@ export class ViewsPanel {
     const { navigation, clipping } = this.parts_;
     const shown = this.elevation();
     this.turn_rad_ = turn_rad;
-    if (this.section) clipping.section = section_of_box({ ...this.section, turn_rad });
+    if (this.section) clipping.edit(section_of_box({ ...this.section, turn_rad }));
     if (shown) this.choose(shown);
     else this.draw(navigation.eye);
     this.show_fields();
@@ -155,17 +162,18 @@ export class ViewsPanel {
     this.draw(this.eye_);
   }
 
-  /** An orthographic camera moves back along its axis where the box has come too near: its picture stays. */
+  /** An orthographic camera moves back along its axis where the box has come too near: its picture stays. A flight goes on. */
   private stay_outside(): void {
     const { section } = this;
     const { navigation } = this.parts_;
-    const { eye } = navigation;
-    if (!section || eye.view_height === undefined) return;
+    const { eye, camera } = navigation;
+    if (!section || eye.view_height === undefined || camera.is_flying) return;
     const view = rotate(eye.orientation, forward);
-    const extent = extent_along(section, navigation.camera.up, view);
+    const extent = extent_along(section, camera.up, view);
     const before = dot(sub(section.centre, eye.position), view) - extent / 2;
-    if (before >= extent / 4) return;
-    navigation.put({ ...eye, position: add(eye.position, scale(view, before - extent / 2)) });
+    const room = room_before(extent, this.near_z);
+    if (before >= room / 2) return;
+    navigation.put({ ...eye, position: add(eye.position, scale(view, before - room)) });
   }
 
   private show_fields(): void {

@@ -1,5 +1,5 @@
 // The floor that a ray meets, by the map alone: no question to the server.
-import { dot } from '../base/vector';
+import { dot, clamp } from '../base/vector';
 import type { Ray } from '../camera/ray';
 import { clear_near } from './map_walker';
 import { height_of, Kind, kind_of } from './tiles';
@@ -60,7 +60,7 @@ export function floor_along(map: WalkMap, ray: Ray): Stand | undefined {
       return near ? last : undefined;
     }
     if (met !== undefined) {
-      const along = dz === 0 ? from : Math.min(Math.max((met - z0) / dz, from), to);
+      const along = dz === 0 ? from : clamp((met - z0) / dz, from, to);
       return clear_near(map, { east: x0 + dx * along, north: y0 + dy * along, height: met });
     }
     const below = clear_below(map, column, row, Math.min(a, b));

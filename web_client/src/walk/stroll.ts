@@ -1,5 +1,5 @@
 // A walk along a path as a movement that is known in advance. Pure.
-import { add, length, look_at, scale, slerp, sub, type Vec3 } from '../base/vector';
+import { add, length, look_at, scale, slerp, sub, type Vec3, clamp } from '../base/vector';
 import type { Eye } from '../camera/eye';
 import type { Flight } from '../camera/flight';
 import { cells_per_eye_height, eyes_of, type Stand, type WalkMap } from './walk_map';
@@ -55,7 +55,7 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
       else high = middle;
     }
     const piece = along[high]! - along[low]!;
-    const share = piece > 0 ? Math.min(1, Math.max(0, (gone - along[low]!) / piece)) : 1;
+    const share = piece > 0 ? clamp((gone - along[low]!) / piece, 0, 1) : 1;
     return add(eyes[low]!, scale(sub(eyes[high]!, eyes[low]!), share));
   };
   /** Even speed, which grows and shrinks evenly at the ends. */
@@ -70,7 +70,7 @@ export function stroll(map: WalkMap, path: readonly Stand[], from: Eye): Flight 
   return {
     duration_s,
     at: (time_s) => {
-      const gone = duration_s > 0 ? gone_at(Math.min(Math.max(time_s, 0), duration_s)) : way;
+      const gone = duration_s > 0 ? gone_at(clamp(time_s, 0, duration_s)) : way;
       const here = point_at(gone);
       // Towards the end, the direction stays that of the last stretch.
       const back = Math.max(0, Math.min(gone, way - ahead));

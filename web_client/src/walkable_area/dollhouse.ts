@@ -46,7 +46,7 @@ export class Dollhouse {
     const { camera } = navigation;
     clipping.ceiling = ceiling_cut(this.map_, storey);
     if (!this.before_) {
-      this.before_ = { eye: navigation.eye, mode: camera.mode };
+      this.before_ = { eye: camera.perspective_eye, mode: camera.mode };
       navigation.taken_over.emit();
       navigation.set_mode(outside_mode);
       navigation.gestures.set('dollhouse', this.take);
@@ -89,6 +89,12 @@ export class Dollhouse {
       if (navigation.camera.mode === outside_mode) navigation.set_mode(before.mode);
     }
     return before;
+  }
+
+  /** The visitor is back at once: something else leads the camera on from there. */
+  led_away(): void {
+    const before = this.end();
+    if (before) this.parts_.navigation.camera.jump(before.eye);
   }
 
   /** The whole scene again. */

@@ -54,7 +54,7 @@ export class WalkableArea {
     navigation.taken_over.listen(() => this.walking_?.stay());
     navigation.led_away.listen(() => {
       notice.withdraw(text.floor_plan.no_floor);
-      this.house_?.end();
+      this.house_?.led_away();
       this.walking_?.stay();
     });
     navigation.mode_chosen.listen(() => {

@@ -96,7 +96,10 @@ export class Walking {
     const { camera } = this.parts_.navigation;
     const { position } = camera.pose;
     const waits = (): boolean =>
-      camera.mode === 'walk' && !camera.is_flying && same(camera.pose.position, position);
+      camera.mode === 'walk' &&
+      !camera.is_orthographic &&
+      !camera.is_flying &&
+      same(camera.pose.position, position);
     if (!waits()) return true;
     const eyes = this.walker.eyes_below(position);
     if (!eyes) return false;
@@ -118,6 +121,7 @@ export class Walking {
   /** Walks there, or flies where the visitor does not stand. */
   async go_to(to: Stand): Promise<void> {
     const { navigation, reduced_motion } = this.parts_;
+    navigation.leave_orthographic();
     const eye = navigation.eye;
     if (navigation.camera.mode !== 'walk' || !this.walker.stand_near(eye.position)) {
       const position = eyes_of(this.map, to);

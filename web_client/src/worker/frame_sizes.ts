@@ -1,3 +1,4 @@
+import { clamp } from '../base/vector';
 import type { Sides } from '../present/warp';
 import type { Quality, View } from '../session/quality';
 import type { SettingsInit } from '../wire/wire';
@@ -29,5 +30,4 @@ export function frame_sizes(
 }
 
 /** Limits a side to the range of the wire and makes it even, because 4:2:0 video has no odd sides. */
-const frame_side = (px: number): number =>
-  Math.min(wire_most_px, Math.max(16, Math.round(px / 2) * 2));
+const frame_side = (px: number): number => clamp(Math.round(px / 2) * 2, 16, wire_most_px);
