@@ -109,7 +109,8 @@ CATGS_HD_INLINE auto is_kept(const CameraModel<T>& camera, const Vec3<T>& mean) 
   return between(camera.clip[0]) & between(camera.clip[1]) & between(camera.clip[2]);
 }
 
-/// What places beside the view axis are divided by at a view depth.
+/// The divisor of positions beside the view axis at a view depth: the depth itself, or 1 where rays
+/// are parallel.
 template <class T>
 CATGS_HD_INLINE T perspective_divisor(const CameraModel<T>& camera, T depth) {
   return mul_add(camera.z_weight, depth, camera.z_offset);

@@ -26,7 +26,7 @@ struct SceneEntry {
   ToursAnswers tours{};
   std::shared_ptr<const std::string> poster{};  // a JPEG file; null: none
 
-  /// What a ray meets of that which the box leaves in.
+  /// The first thing that a ray meets, of all that the box leaves in.
   [[nodiscard]] Picked seen_along(const Pick& ray, const ClipBox& clip) const {
     const RayPart part = kept_part(clip, ray.origin, ray.direction);
     // Also where the part has overflowed: its bounds are infinite or not numbers.

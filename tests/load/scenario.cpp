@@ -95,7 +95,7 @@ void read_group(const std::filesystem::path& path, const toml::table& table, Gro
   for (std::string& trace : group.traces) trace = (path.parent_path() / trace).string();
 }
 
-/// What a row of a matrix is called and adds to its clients.
+/// A row of a matrix: its name, and the settings that it adds to its clients.
 struct MatrixEntry {
   const toml::table* table;
   std::string name;

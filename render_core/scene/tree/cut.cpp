@@ -70,7 +70,7 @@ class Walk {
     if (errors.px < 0.0f) return;
     errors.typical_px = std::min(errors.typical_px, step.most_px);
     const bool leaf = step.node.level == 0;
-    // Who draws a leaf asks for its own bounds.
+    // Leaves are asked about when they are drawn, by their own bounds.
     if (!leaf && parts_.hides && parts_.hides(facts.bounds)) return;
     const float split = leaf ? 0.0f : split_into_children(step, errors);
     if (!draws_ || split >= step.taken) return;

@@ -120,7 +120,7 @@ struct PageInMemory {
 };
 using FindPage = std::function<PageInMemory(std::uint64_t page)>;
 
-/// What is wanted of a cut: all, or what a frame or a pool needs alone.
+/// The wanted parts of a cut: all, or those that a frame or a pool needs.
 struct CutParts {
   enum class Part { all, drawn, pages };
   Part part = Part::all;  // pages: those used and missing. Pages of leaves are not looked into

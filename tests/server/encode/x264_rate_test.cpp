@@ -52,8 +52,8 @@ class Coder {
   }
   [[nodiscard]] int threads() const { return threads_; }
   [[nodiscard]] bool sharp() const { return frame_.sharp; }
-  /// Of the pictures that count. One picture of a busy machine, whose slice waited for a processor,
-  /// moves a mean of 20 by a decibel.
+  /// The median, because one picture of a busy machine, whose slice waited for a processor, moves a
+  /// mean of 20 by a decibel.
   [[nodiscard]] double median_db() const {
     std::vector<double> sorted = db_;
     std::ranges::sort(sorted);
