@@ -45,10 +45,10 @@ inline constexpr std::size_t most_film_frames = 18'000;  // ten minutes
 
 /// Reads {"kind": "film", "size": [1280, 720], "views": [[x, y, z, qx, qy, qz, qw, fov_deg], 30,
 /// …]}. A view without its last number keeps the field of view before. A ninth number is the height
-/// of an orthographic view. A whole number in place of a view repeats the view before so many times.
-/// "box" may be [x, y, z, qx, qy, qz, qw, half width, half depth, half height]. Sizes: a picture at
-/// most 7680x4320, a panorama 2:1 and at most 8192x4096, a film even and at most 1920x1080. Throws
-/// InputError that names the field.
+/// of an orthographic view. A whole number in place of a view repeats the view before so often.
+/// "box" may be [x, y, z, qx, qy, qz, qw, half width, half depth, half height]. Sizes: a picture
+/// at most 7680x4320, a panorama 2:1 and at most 8192x4096, a film even and at most 1920x1080.
+/// Throws InputError that names the field.
 FilmRequest parse_film_request(std::string_view json);
 
 }  // namespace catgs
