@@ -83,6 +83,13 @@ inline Camera cropped(const Camera& whole, glm::ivec2 from_px, glm::ivec2 size_p
   return part;
 }
 
+/// The camera whose picture goes on for `margin_px` on all sides.
+inline Camera padded(Camera camera, int margin_px) {
+  camera.size_px += 2 * margin_px;
+  camera.principal_point_px += static_cast<float>(margin_px);
+  return camera;
+}
+
 /// Focal length in pixels of an image `height_px` high that spans `fov_y_rad` vertically.
 inline float focal_from_fov_y(float fov_y_rad, int height_px) {
   return 0.5f * static_cast<float>(height_px) / std::tan(0.5f * fov_y_rad);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <string>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
@@ -95,23 +97,34 @@ Pose uniform_motion(const Pose& from, const Pose& to, float share) {
                                               static_cast<double>(share))))};
 }
 
-float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth) {
+glm::ivec2 middle_shift_px(const Camera& key, const Pose& now, float depth) {
+  const glm::dvec2 middle = 0.5 * glm::dvec2(key.size_px);
+  const glm::dvec2 image = RelativeView(key, now).image_of(middle, static_cast<double>(depth));
+  const glm::dvec2 shift = glm::round(image - middle);
+  const glm::dvec2 far(2.0 * max_coordinate);
+  return glm::ivec2(glm::clamp(shift, -far, far));
+}
+
+float max_displacement_px(const Camera& now, const Pose& end, float nearest_depth,
+                          glm::ivec2 end_shift_px) {
   assert(nearest_depth > 0.0f);
   const RelativeView view(now, end);
   double largest = 0.0;
   for_each_point(now, nearest_depth, [&](const glm::dvec2& pixel, double depth) {
-    largest = std::max(largest, glm::distance(pixel, view.image_of(pixel, depth)));
+    const glm::dvec2 image = view.image_of(pixel, depth) - glm::dvec2(end_shift_px);
+    largest = std::max(largest, glm::distance(pixel, image));
   });
   return static_cast<float>(largest);
 }
 
-float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, float nearest_depth) {
+float max_deviation_px(const Camera& key, const Pose& end, const Pose& now, float nearest_depth,
+                       glm::ivec2 end_shift_px, glm::ivec2 shift_px) {
   assert(nearest_depth > 0.0f);
   const RelativeView end_view(key, end), now_view(key, now);
   double largest = 0.0;
   for_each_point(key, nearest_depth, [&](const glm::dvec2& pixel, double depth) {
-    const glm::dvec2 trail = end_view.image_of(pixel, depth) - pixel;
-    const glm::dvec2 moved = now_view.image_of(pixel, depth) - pixel;
+    const glm::dvec2 trail = end_view.image_of(pixel, depth) - pixel - glm::dvec2(end_shift_px);
+    const glm::dvec2 moved = now_view.image_of(pixel, depth) - pixel - glm::dvec2(shift_px);
     if (std::isinf(trail.x) || std::isinf(moved.x)) {
       largest = std::numeric_limits<double>::infinity();
       return;
@@ -130,46 +143,66 @@ int speculation_window(int initial_window, float max_trail_px, float displacemen
   return static_cast<int>(static_cast<double>(initial_window) * max_trail_px / displacement_px);
 }
 
-FrameGroups::FrameGroups(const SpeculationSettings& settings) : settings_(settings) {
+FrameGroups::FrameGroups(const SpeculationSettings& settings, TileGrid grid)
+    : settings_(settings), grid_(grid) {
   check_speculation(settings);
 }
 
 FramePlan FrameGroups::plan(const Camera& now, const std::optional<Forecast>& forecast,
-                            float nearest_depth) {
+                            float depth) {
   const float min_depth = speculation_min_depth(settings_, now.near_z);
-  if (!(nearest_depth > min_depth)) nearest_depth = min_depth;
-  if (forecast && continues(now, nearest_depth)) {
+  if (!(depth > min_depth)) depth = min_depth;
+  if (forecast && continues(now, depth)) {
     ++drawn_;
     FramePlan plan = group_;
     plan.kind = FrameKind::sub;
     return plan;
   }
   key_ = now;
+  depth_ = depth;
   drawn_ = 0;
   group_ = {.window_end = now};
-  if (forecast && forecast->frames > 0) begin_group(now, *forecast, nearest_depth);
+  if (forecast && forecast->frames > 0) begin_group(now, *forecast, depth);
   return group_;
 }
 
 /// Finds the window of the group that begins with a key frame.
-void FrameGroups::begin_group(const Camera& now, const Forecast& forecast, float nearest_depth) {
+void FrameGroups::begin_group(const Camera& now, const Forecast& forecast, float depth) {
   const auto after = [&](int frames) {
     return uniform_motion(now.world_from_camera, forecast.world_from_camera,
                           static_cast<float>(frames) / static_cast<float>(forecast.frames));
   };
+  const auto shift_of = [&](const Pose& end) {
+    return grid_ == TileGrid::follows ? middle_shift_px(now, end, depth) : glm::ivec2(0);
+  };
   // The forecast says nothing about the time after its last frame.
   const int longest = std::min(settings_.initial_window, forecast.frames);
-  group_.window = speculation_window(longest, settings_.max_trail_px,
-                                     max_displacement_px(now, after(longest), nearest_depth));
+  const Pose last = after(longest);
+  const glm::ivec2 shift = shift_of(last);
+  const auto travel = static_cast<float>(std::max(std::abs(shift.x), std::abs(shift.y)));
+  group_.window = std::min(speculation_window(longest, settings_.max_trail_px,
+                                              max_displacement_px(now, last, depth, shift)),
+                           speculation_window(longest, static_cast<float>(most_travel_px), travel));
   group_.window_end = at_pose(now, after(group_.window));
+  group_.end_shift_px = glm::clamp(shift_of(group_.window_end.world_from_camera),
+                                   glm::ivec2(-most_travel_px), glm::ivec2(most_travel_px));
 }
 
-/// Whether the group's lists hold everything that the next frame shows. A deviation at infinity
-/// comes from rotation alone, so the bound in pixels bounds the angle too.
-bool FrameGroups::continues(const Camera& now, float nearest_depth) const {
+/// Whether the group's lists hold everything that the next frame shows. Notes where their grid is
+/// in it. A deviation at infinity comes from rotation alone, so the bound in pixels bounds the
+/// angle too.
+bool FrameGroups::continues(const Camera& now, float depth) {
   if (drawn_ >= group_.window || !same_lens(now, key_)) return false;
-  return max_deviation_px(key_, group_.window_end.world_from_camera, now.world_from_camera,
-                          nearest_depth) <= settings_.max_deviation_px;
+  if (grid_ == TileGrid::follows) {
+    depth = depth_;
+    const glm::ivec2 shift = middle_shift_px(key_, now.world_from_camera, depth_);
+    const glm::ivec2 low = glm::min(glm::ivec2(0), group_.end_shift_px) - most_extra_turn_px;
+    const glm::ivec2 high = glm::max(glm::ivec2(0), group_.end_shift_px) + most_extra_turn_px;
+    if (glm::clamp(shift, low, high) != shift) return false;
+    group_.shift_px = shift;
+  }
+  return max_deviation_px(key_, group_.window_end.world_from_camera, now.world_from_camera, depth,
+                          group_.end_shift_px, group_.shift_px) <= settings_.max_deviation_px;
 }
 
 }  // namespace catgs

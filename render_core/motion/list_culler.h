@@ -9,7 +9,9 @@ namespace catgs {
 /// its window's end.
 class ListCuller {
  public:
-  ListCuller(const Camera& camera, const FramePlan& plan) : now_(camera), end_(plan.window_end) {}
+  /// The picture is taken to be wider by `margin_px` on all sides.
+  ListCuller(const Camera& camera, const FramePlan& plan, int margin_px = 0)
+      : now_(padded(camera, margin_px)), end_(padded(plan.window_end, margin_px)) {}
 
   [[nodiscard]] CATGS_HD bool outside(const Cluster& cluster) const {
     return outside_on_the_way(now_, end_, cluster);

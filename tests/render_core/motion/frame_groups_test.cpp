@@ -246,5 +246,56 @@ TEST_F(OpenGroup, EndsWhenTheCachesAreGone) {
   EXPECT_EQ(next(camera_at(moved({0.01f, 0, 0}))), FrameKind::sub);
 }
 
+/// A group on a grid that follows a turn of 0.2 degrees a frame: 3.84 px in the middle.
+class FollowingGroup : public ::testing::Test {
+ protected:
+  static constexpr float rate_deg = 0.2f, depth = 5.0f;
+
+  FollowingGroup() {
+    first_ = groups_.plan(camera_at({}), Forecast{turned(8 * rate_deg, {0, 1, 0}), 8}, depth);
+  }
+  FramePlan next(const Camera& camera) {
+    return groups_.plan(camera, Forecast{camera.world_from_camera, 8}, depth);
+  }
+
+  FrameGroups groups_{following_speculation, TileGrid::follows};
+  FramePlan first_;
+};
+
+TEST_F(FollowingGroup, ATurnMovesTheGridAndLeavesShortTrails) {
+  EXPECT_EQ(first_.window, 8);
+  EXPECT_EQ(first_.end_shift_px, glm::ivec2(-31, 0));  // 1100 tan(1.6 degrees)
+  const FramePlan fixed = FrameGroups{SpeculationSettings{.initial_window = 12}}.plan(
+      camera_at({}), Forecast{turned(8 * rate_deg, {0, 1, 0}), 8}, depth);
+  EXPECT_EQ(fixed.window, 2);
+  EXPECT_EQ(fixed.end_shift_px, glm::ivec2(0));
+}
+
+TEST_F(FollowingGroup, TheGridIsWhereTheCameraReallyIs) {
+  const FramePlan sub = next(camera_at(turned(1.3f * rate_deg, {0, 1, 0})));
+  EXPECT_EQ(sub.kind, FrameKind::sub);
+  EXPECT_EQ(sub.shift_px, glm::ivec2(-5, 0));  // 1100 tan(0.26 degrees)
+}
+
+TEST_F(FollowingGroup, EndsBeyondTheMarginOfTheGrid) {
+  EXPECT_EQ(next(camera_at(turned(-0.3f, {0, 1, 0}))).kind, FrameKind::sub);
+  EXPECT_EQ(next(camera_at(turned(-0.5f, {0, 1, 0}))).kind, FrameKind::key);  // 9.6 px
+}
+
+TEST_F(FollowingGroup, EndsWhereParallaxLeavesTheForecast) {
+  const Pose ahead = turned(rate_deg, {0, 1, 0}, {0, 0, 0.01f});
+  const Pose sideways = turned(rate_deg, {0, 1, 0}, {0.05f, 0, 0});  // 11 px, against infinity
+  EXPECT_EQ(next(camera_at(ahead)).kind, FrameKind::sub);
+  EXPECT_EQ(next(camera_at(sideways)).kind, FrameKind::key);
+}
+
+TEST(FrameGroups, AGridThatFollowsHasABound) {
+  FrameGroups groups(following_speculation, TileGrid::follows);
+  const FramePlan plan =
+      groups.plan(camera_at({}), Forecast{turned(12, {0, 1, 0}), 12}, 5.0f);  // 234 px
+  EXPECT_GT(plan.window, 0);
+  EXPECT_LE(std::abs(plan.end_shift_px.x), most_travel_px);
+}
+
 }  // namespace
 }  // namespace catgs
