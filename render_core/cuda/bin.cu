@@ -58,7 +58,13 @@ __device__ std::uint32_t first_beyond(const std::uint32_t* first, std::uint32_t 
 // Another kernel counted the tiles of large splats, and compilers may round the same formula
 // differently there. With half the slack here, every tile that is found was counted. Tiles that
 // were counted but are not found stay padding.
-constexpr float emit_slack_px = 0.5f * static_cast<float>(listing_slack_px);
+constexpr float emit_slack_px = 0.5f * least_slack_px;
+
+/// How much wider than its path a splat is listed, px.
+template <class Tile>
+__device__ float slack_of(const EmitParams<Tile>& p, std::uint32_t slot) {
+  return p.splat_depth != nullptr ? p.slack.at(p.splat_depth[slot]) : 0.0f;
+}
 
 /// All lanes write one splat. Rows stay in order, so that the list is the same as if a single lane
 /// wrote it.
@@ -81,11 +87,11 @@ __device__ void emit_together(const EmitParams<Tile>& p, Window& window,
 template <class Tile>
 __device__ void emit_large(const EmitParams<Tile>& p, Window& window, std::uint32_t slot,
                            std::uint32_t at) {
-  const SplatRecord& r = p.records[slot];
   if (p.path != nullptr) {
-    emit_together(p, window, make_footprint(r.centre_px, p.path[slot], p.shape, emit_slack_px),
-                  slot, at);
+    with_footprint(p.path[slot], p.shape, emit_slack_px + slack_of(p, slot),
+                   [&](const auto& footprint) { emit_together(p, window, footprint, slot, at); });
   } else {
+    const SplatRecord& r = p.records[slot];
     emit_together(p, window,
                   make_footprint(r.centre_px, r.whitening, r.log2_opacity, p.shape, emit_slack_px),
                   slot, at);
@@ -110,10 +116,13 @@ __device__ std::uint32_t hidden_blocks(const float* part_limit, float depth) {
 template <class Tile>
 __device__ std::uint32_t blocks_of_entry(const EmitParams<Tile>& p, int column, int row,
                                          std::uint32_t tile, std::uint32_t slot) {
-  const SplatRecord& r = p.records[slot];
-  const std::uint32_t blocks =
-      p.path != nullptr ? make_footprint(r.centre_px, p.path[slot], p.shape).blocks(column, row)
-                        : blocks_of(r.centre_px, r.whitening, r.log2_opacity, column, row);
+  std::uint32_t blocks = 0;
+  if (p.path != nullptr) {
+    blocks = blocks_of(p.path[slot], p.shape, column, row, least_slack_px + slack_of(p, slot));
+  } else {
+    const SplatRecord& r = p.records[slot];
+    blocks = blocks_of(r.centre_px, r.whitening, r.log2_opacity, column, row);
+  }
   if (p.occlusion.part == nullptr) return blocks;
   const float depth = p.splat_depth[slot];
   if (!(depth > p.occlusion.tile[tile].x)) return blocks;

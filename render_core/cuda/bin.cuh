@@ -21,8 +21,9 @@ struct EmitParams {
   const std::uint32_t* tile_count;  // [visible_bound], by slot
   const TileSpans* spans;           // [visible_bound], by slot
   const SplatPath* path;            // [visible_bound], by slot; null: splats do not move
+  ListSlack slack;                  // of paths
   Occlusion occlusion;
-  const float* splat_depth;  // [visible_bound], by slot; for occlusion
+  const float* splat_depth;  // [visible_bound], by slot; null: no occlusion and no slack
   std::uint32_t* in_window;  // TileSortParams::in_window; null: not wanted
   Tile* tile;                // [list_bound], tile index; shape.tiles() means no tile
   TileEntry* entry;          // [list_bound]

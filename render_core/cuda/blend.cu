@@ -178,8 +178,18 @@ struct Waiting {
 /// coefficients of such splats, but not of those far away.
 constexpr float most_at_origin = 128.0f;
 
+/// The halves that the circle around a splat may meet, a bit each. `x`, `y`: its centre, px from
+/// the part's origin.
+__device__ unsigned halves_met(float radius_px, float x, float y) {
+  constexpr float middle = 0.5f * part_side_px;
+  static_assert(halves == 2 && 2 * block_height_px == part_side_px);
+  if (fabsf(x) > radius_px + middle || fabsf(y) > radius_px + middle) return 0;
+  return (y <= radius_px ? 1u : 0u) | (y >= -radius_px ? 2u : 0u);
+}
+
 /// Stages the splats of a group for each unfinished half that they reach. `live`: those halves'
 /// blocks.
+template <bool loose>
 __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Groups& groups,
                       const std::uint32_t (&live)[halves], Waiting (&waiting)[halves]) {
   const unsigned lanes_before = (1u << threadIdx.x % warp_size) - 1u;
@@ -188,17 +198,18 @@ __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Grou
 #pragma unroll
   for (unsigned i = 0; i < lane_splats; ++i) {
     const SplatRecord record = groups.splat(i);
-    const auto field = math::exponent_field<float>(
-        record.whitening,
-        {record.centre_px.x - pixels.origin_x(), record.centre_px.y - pixels.origin_y()},
-        record.log2_opacity);
+    const float x = record.centre_px.x - pixels.origin_x();
+    const float y = record.centre_px.y - pixels.origin_y();
+    const auto field = math::exponent_field<float>(record.whitening, {x, y}, record.log2_opacity);
+    const unsigned met = loose ? halves_met(__half2float(record.colour.radius_px), x, y) : ~0u;
     splat[i] = staged_splat(field, reinterpret_cast<const uint2&>(record.colour));
     // With a window, a list has splats that reach nothing now, or are far from here.
     const bool near = math::reach_of(record.log2_opacity) >= 0.0f &&
                       field.u * field.u + field.v * field.v <= most_at_origin;
 #pragma unroll
     for (int half = 0; half < halves; ++half)
-      hits[i][half] = __ballot_sync(~0u, near && (groups.blocks(i) & live[half]) != 0);
+      hits[i][half] = __ballot_sync(
+          ~0u, near && (met >> half & 1u) != 0 && (groups.blocks(i) & live[half]) != 0);
   }
   __syncwarp();  // all lanes have read the last round
 #pragma unroll
@@ -306,7 +317,20 @@ __device__ void gather_states(WarpScratch& scratch, const HalfPixels (&half_pixe
   }
 }
 
-template <bool count_pairs>
+/// The end of a part that has looked at the entries before `looked_at`, and finished. Called by the
+/// whole warp.
+template <bool loose>
+__device__ float end_of(const BlendParams& p, const BlendTask& task, std::uint32_t looked_at) {
+  if (!loose) return p.ends.splat_depth[p.entries[looked_at - 1].slot];
+  static_assert(loose_end_entries == warp_size);
+  const std::uint32_t back = 1 + threadIdx.x % warp_size;
+  const std::uint32_t at = looked_at - min(back, looked_at - task.first);
+  // Depths of splats in front of the camera are positive, so their bits compare as they do.
+  const float depth = fmaxf(p.ends.splat_depth[p.entries[at].slot], 0.0f);
+  return __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(depth)));
+}
+
+template <bool loose, bool count_pairs>
 __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint32_t task_index,
                            int part) {
   const int lane = static_cast<int>(threadIdx.x) % warp_size;
@@ -336,7 +360,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
     const bool more = groups.more();
     if (more) {
       groups.take(live[0] | live[1]);
-      stage(scratch, pixels, groups, live, waiting);
+      stage<loose>(scratch, pixels, groups, live, waiting);
     } else {
       fill_up(scratch, waiting);
     }
@@ -363,8 +387,11 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
 #pragma unroll
   for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
   largest = __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
-  if (lane != 0) return;
   const std::uint32_t looked_at = groups.taken();
+  const bool finished = largest <= 0.0f && looked_at > task.first;
+  const bool ends = p.ends.depth != nullptr && task.slices == 1;
+  const float end = ends && finished ? end_of<loose>(p, task, looked_at) : INFINITY;
+  if (lane != 0) return;
   if (task.slices > 1) {
     const std::uint32_t at = slice_part(slice, part);
     p.consumed[at] = looked_at;
@@ -373,12 +400,11 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
     return;
   }
   atomicMax(&p.reach[task.tile], looked_at - task.first);
-  const bool finished = largest <= 0.0f && looked_at > task.first;
-  p.ends.note(task.tile, part, finished, finished ? p.entries[looked_at - 1].slot : 0);
+  if (ends) p.ends.note(task.tile, part, end);
 }
 
 /// Warps take parts from a queue, so that none waits for the longest part of its tile or block.
-template <bool count_pairs>
+template <bool loose, bool count_pairs>
 __global__ void __launch_bounds__(block_size, blocks_per_processor)
     blend_kernel(const BlendParams p) {
   __shared__ WarpScratch scratch[warps_per_block];
@@ -402,7 +428,7 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
     }
     if (queue_class == queue_classes) return;
     const std::uint32_t task = p.queue[queue_class * p.shape.tiles() + position];
-    blend_part<count_pairs>(p, scratch[warp], task, static_cast<int>(work % parts_per_tile));
+    blend_part<loose, count_pairs>(p, scratch[warp], task, static_cast<int>(work % parts_per_tile));
     __syncwarp();
   }
 }
@@ -411,13 +437,17 @@ __global__ void __launch_bounds__(block_size, blocks_per_processor)
 
 int blend_warps(int processors) {
   int blocks = 0;
-  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, blend_kernel<false>, block_size, 0),
+  check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, blend_kernel<false, false>,
+                                                      block_size, 0),
         "occupancy");
   return processors * blocks * warps_per_block;
 }
 
 void launch_blend(const BlendParams& params, cudaStream_t stream) {
-  const auto kernel = params.count_pairs ? blend_kernel<true> : blend_kernel<false>;
+  const auto kernel =
+      params.loose ? params.count_pairs ? blend_kernel<true, true> : blend_kernel<true, false>
+      : params.count_pairs ? blend_kernel<false, true>
+                           : blend_kernel<false, false>;
   kernel<<<params.warps / warps_per_block, block_size, 0, stream>>>(params);
   check_launch("blend");
 }

@@ -66,12 +66,14 @@ struct PartEnds {
   const float* splat_depth;  // [visible_bound]
   float* depth;              // [tiles][parts_per_tile]; null: not wanted
 
-  __device__ void note(std::uint32_t tile, int part, bool finished, std::uint32_t slot) const {
-    if (depth == nullptr) return;
-    depth[tile * parts_per_tile + static_cast<unsigned>(part)] =
-        finished ? splat_depth[slot] : INFINITY;
+  __device__ void note(std::uint32_t tile, int part, float end) const {
+    depth[tile * parts_per_tile + static_cast<unsigned>(part)] = end;
   }
 };
+
+/// Lists of a group with a window hold more than its frames show, and in sub-frames their order is
+/// only nearly that of depth. The end of a part is then the deepest of so many last entries.
+constexpr unsigned loose_end_entries = 32;
 
 /// Blends all tasks front to back. Whole tiles go straight to the image, slices to slice_pixels.
 struct BlendParams {
@@ -92,6 +94,7 @@ struct BlendParams {
   Finish finish;
   std::uint32_t* reach;  // [tiles], zeroed; number of entries that a whole tile looked at
   FrameCounts* counts;   // next_part is consumed; blended_pairs is set when counted
+  bool loose;            // lists of a group with a window
   bool count_pairs;      // slower
   int warps;             // that the device runs at a time, by blend_warps()
 };

@@ -6,6 +6,8 @@
 #include "render_core/cuda/convert.cuh"
 #include "render_core/cuda/cuda_view.cuh"
 #include "render_core/cuda/frame_output.cuh"
+#include "render_core/cuda/group_grid.h"
+#include "render_core/cuda/list_repair.cuh"
 #include "render_core/cuda/occlusion.cuh"
 #include "render_core/cuda/project.cuh"
 #include "render_core/cuda/split.cuh"
@@ -18,15 +20,6 @@ int processors_of(int device) {
   int processors = 0;
   check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, device), "device");
   return processors;
-}
-
-/// Sets the tiles of a picture.
-void set_tiles(FrameShape& shape, glm::ivec2 size_px, int tile_side) {
-  const glm::ivec2 tiles = (size_px + (tile_side - 1)) / tile_side;
-  shape.width_px = size_px.x;
-  shape.height_px = size_px.y;
-  shape.tiles_x = tiles.x;
-  shape.tiles_y = tiles.y;
 }
 
 /// The most Gaussians that a frame may look at.
@@ -48,7 +41,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       device_(device),
       processors_(processors_of(device)),
       settings_(settings),
-      driver_(settings_),
+      driver_(settings_, FrameDriver::CatgsWindows::some),
       room_(most_gaussians(scene_->arrays()), settings.max_list_entries, settings.split_tasks),
       builder_(memory_, processors_),
       blend_warps_(blend_warps(processors_)) {
@@ -57,7 +50,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
   // device without room for it should say so while another can be chosen. For a large scene, only
   // the first frame tells how much is in view.
   if (settings.pipeline == Pipeline::vanilla) return;
-  set_shape(glm::ivec2(tile_side_px), tile_side_px);
+  set_shape(glm::ivec2(tile_side_px), {}, tile_side_px);
   reserve(Headroom::none);
   shape_ = {};
 }
@@ -68,14 +61,14 @@ RenderStatus CudaView::render(const FrameRequest& request, FrameView& frame) noe
       [&] { forget_frames(); });
 }
 
-FrameView CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
+std::optional<FrameView> CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
   check(cudaSetDevice(device_), "device");
   if (settings_.pipeline == Pipeline::vanilla) {
     draw_vanilla(request);
   } else if (plan.kind == FrameKind::key) {
     draw_key(request, plan);
-  } else {
-    draw_sub(request);
+  } else if (!draw_sub(request, plan)) {
+    return std::nullopt;
   }
   return finished(plan.kind, request.camera.near_z);
 }
@@ -84,13 +77,13 @@ FrameView CudaView::draw(const FrameRequest& request, const FramePlan& plan) {
 /// with them.
 void CudaView::forget_frames() {
   shape_ = {};
-  reach_known_ = false;
+  reach_of_.reset();
   ends_of_.reset();
 }
 
-void CudaView::set_shape(glm::ivec2 size_px, int tile_side) {
+void CudaView::set_shape(glm::ivec2 size_px, const FramePlan& plan, int tile_side) {
   if (shape_.width_px != size_px.x || shape_.height_px != size_px.y) forget_frames();
-  set_tiles(shape_, size_px, tile_side);
+  set_grid(shape_, size_px, plan, tile_side, follows() ? grid_margin_px : 0);
   const FrameSizes room = room_.sizes();
   shape_.visible_bound = room.visible;
   shape_.list_bound = room.list_entries;
@@ -100,7 +93,7 @@ void CudaView::set_shape(glm::ivec2 size_px, int tile_side) {
 /// Reserves memory for the frame's shape. Where lists need more memory, `headroom` adds some, so
 /// that they do not need more again and again. Throws CudaError.
 void CudaView::reserve(Headroom headroom) {
-  FrameShape roomy = shape_;
+  FrameShape roomy = follows() && windows_ ? with_largest_grid(shape_) : shape_;
   if (headroom == Headroom::some && !memory_.holds_lists(shape_)) {
     const FrameSizes most = room_.limits();
     roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
@@ -109,25 +102,27 @@ void CudaView::reserve(Headroom headroom) {
   if (memory_.reserve({.shape = roomy,
                        .scene = scene_->arrays(),
                        .in_pages = paged_.has_value(),
-                       .settings = settings_})) {
-    reach_known_ = false;
+                       .settings = settings_,
+                       .windows = windows_})) {
+    reach_of_.reset();
     ends_of_.reset();
   }
 }
 
 /// Sets the frame's shape and makes room for it. Where the device has too little memory, it first
 /// gives up the headroom, then slices, then the farther part of the lists.
-void CudaView::make_room(glm::ivec2 size_px) {
+void CudaView::make_room(glm::ivec2 size_px, const FramePlan& plan) {
   const FrameRoom wanted = room_;
+  windows_ = windows_ || plan.window > 0;
   Headroom headroom = Headroom::some;
   for (;;) {
-    set_shape(size_px, tile_side_px);
+    set_shape(size_px, plan, tile_side_px);
     try {
       reserve(headroom);
       return;
     } catch (const CudaError& error) {
       memory_.release();
-      reach_known_ = false;
+      reach_of_.reset();
       ends_of_.reset();
       const bool short_of_memory = error.status_code() == RenderStatus::Code::out_of_memory;
       const bool had_headroom = std::exchange(headroom, Headroom::none) == Headroom::some;
@@ -146,24 +141,32 @@ bool CudaView::needs_more_room() {
 }
 
 void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
-  ListRequest listed(request.camera, plan, settings_.speculation);
   if (paged_) paged_->begin(request, plan);
   for (;;) {
-    make_room(request.camera.size_px);
+    make_room(request.camera.size_px, plan);
+    ListRequest listed(request.camera, plan, settings_.speculation,
+                       follows() ? std::optional(corner_px()) : std::nullopt);
     times_.begin(stream_.get());
     listed.scene = scene_arrays();
     if (paged_) listed.cut = cut_tree(request, plan);
-    listed.occlusion = want_occlusion(request.camera);
+    listed.occlusion = want_occlusion(listed, plan);
+    group_ = {
+        .loose = follows() && plan.window > 0, .corner_px = corner_px(), .slack = listed.slack};
     list_tiles(listed);
-    split();
+    split(FrameKind::key);
     times_.end(Stage::sort, stream_.get());
     blend(request);
     deliver();
     if (!needs_more_room()) break;
     ends_of_.reset();  // this drawing has replaced the last frame's ends
   }
-  reach_known_ = true;
-  if (settings_.pipeline == Pipeline::catgs) ends_of_ = request.camera;
+  note_ends(request.camera);
+}
+
+/// The ends of parts are those of the frame that was drawn.
+void CudaView::note_ends(const Camera& camera) {
+  if (follows())
+    ends_of_ = {.camera = in_grid(make_camera_pair(camera), corner_px()).single, .shape = shape_};
 }
 
 /// The scene, and the part of each cluster that is drawn.
@@ -183,17 +186,24 @@ TreeCut CudaView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
           .share = memory_.share.get()};
 }
 
-/// Finds what the last frame shows to be hidden in this one.
-Occlusion CudaView::want_occlusion(const Camera& camera) {
+/// Finds what the last frame shows to be hidden in this one, or in all of its window.
+Occlusion CudaView::want_occlusion(const ListRequest& listed, const FramePlan& plan) {
   const ViewMemory& m = memory_;
   if (!ends_of_) return {};
-  const auto now = make_camera_pair(camera).single, last = make_camera_pair(*ends_of_).single;
-  const int radius = math::occlusion_radius<float>(now, last, mean_inverse_depth_, part_side_px);
-  if (radius < 0) return {};
+  const auto radius_from = [&](const math::CameraModel<float>& camera) {
+    return math::occlusion_radius<float>(camera, ends_of_->camera, mean_inverse_depth_,
+                                         part_side_px);
+  };
+  const auto &now = listed.cameras.now.single, &end = listed.cameras.end;
+  const int at_start = radius_from(now), at_end = radius_from(end);
+  if (at_start < 0 || at_end < 0) return {};
   launch_occlusion({.shape = shape_,
                     .now = now,
-                    .last = last,
-                    .radius = radius,
+                    .end = end,
+                    .sweeps = listed.sweeps,
+                    .shown = box_of_pictures(shape_, plan, listed.sweeps ? grid_margin_px : 0),
+                    .last = *ends_of_,
+                    .radius = std::max(at_start, at_end),
                     .last_ends = m.part_ends.get(),
                     .part = m.part_limit.get(),
                     .tile = m.tile_limit.get()},
@@ -214,35 +224,67 @@ void CudaView::list_tiles(const ListRequest& request) {
   builder_.sort_by_tile(shape_, stream);
 }
 
-void CudaView::draw_sub(const FrameRequest& request) {
+/// Draws from the lists of the group. False where they do not hold.
+bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
+  const cudaStream_t stream = stream_.get();
+  const glm::ivec2 corner = cuda::corner_px(group_.corner_px, plan);
+  shape_.left_px = corner.x;
+  shape_.top_px = corner.y;
+  times_.begin(stream);
+  project_group(request.camera);
+  times_.end(Stage::project, stream);
+  times_.end(Stage::bin, stream);
+  if (follows() && !lists_hold()) return false;
+  split(FrameKind::sub);
+  times_.end(Stage::sort, stream);
+  blend(request);
+  deliver();
+  note_ends(request.camera);
+  return true;
+}
+
+/// Projects the Gaussians of the group.
+void CudaView::project_group(const Camera& camera) {
   const cudaStream_t stream = stream_.get();
   const ViewMemory& m = memory_;
-  times_.begin(stream);
   constexpr std::size_t kept = offsetof(FrameCounts, nearness);
   check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
                         sizeof(FrameCounts) - kept, stream),
         "counts");
-  const CameraPair now = make_camera_pair(request.camera);
+  m.list_counts.get()->strays = 0;
+  const CameraPair now = in_grid(make_camera_pair(camera), corner_px());
   launch_project({.scene = scene_arrays(),
-                  .camera = {.now = now, .end = now.single, .near_z = request.camera.near_z},
+                  .camera = {.now = now, .end = now.single, .near_z = camera.near_z},
                   .shape = shape_,
-                  .min_depth = speculation_min_depth(settings_.speculation, request.camera.near_z),
+                  .min_depth = speculation_min_depth(settings_.speculation, camera.near_z),
                   .counts = m.counts.get(),
                   .visible = m.visible.get(),
                   .records = m.records.get(),
                   .depth_key = m.depth.get(),
-                  .splat_depth = nullptr,
+                  .splat_depth = m.splat_depth.get(),
                   .tile_count = nullptr,
                   .spans = nullptr,
-                  .path = nullptr,
-                  .order = nullptr},
+                  .path = follows() ? m.path.get() : nullptr,
+                  .slack = group_.slack,
+                  .order = nullptr,
+                  .host_counts = m.list_counts.get()},
                  Listing::none, stream);
-  times_.end(Stage::project, stream);
-  times_.end(Stage::bin, stream);
-  split();
-  times_.end(Stage::sort, stream);
-  blend(request);
-  deliver();
+  check(cudaEventRecord(projected_.get(), stream), "strays");
+}
+
+/// Whether no more splats than a picture can miss have left their lists. Meanwhile, the lists are
+/// repaired.
+bool CudaView::lists_hold() {
+  const ViewMemory& m = memory_;
+  launch_list_repair({.shape = shape_,
+                      .range = m.range.get(),
+                      .reach = reach_of_ ? m.reach.get() : nullptr,
+                      .splat_depth = m.splat_depth.get(),
+                      .shifted = group_.sub_frames++ % 2 == 1,
+                      .entries = m.entries.get()},
+                     stream_.get());
+  check(cudaEventSynchronize(projected_.get()), "strays");
+  return m.list_counts.get()->strays <= most_strays;
 }
 
 void CudaView::draw_vanilla(const FrameRequest& request) {
@@ -251,7 +293,7 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
   const FrameShape picture{.width_px = request.camera.size_px.x,
                            .height_px = request.camera.size_px.y};
   (void)memory_.reserve({.shape = picture, .scene = {}, .in_pages = false, .settings = settings_});
-  set_shape(request.camera.size_px, tile_size_px);
+  set_shape(request.camera.size_px, {}, tile_size_px);
   shape_.list_bound = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(settings_.max_list_entries, list_entries_limit));
   const cudaStream_t stream = stream_.get();
@@ -270,15 +312,26 @@ void CudaView::draw_vanilla(const FrameRequest& request) {
 }
 
 /// Cuts the tiles into tasks.
-void CudaView::split() {
-  const ViewMemory& m = memory_;
+void CudaView::split(FrameKind kind) {
+  ViewMemory& m = memory_;
+  m.reach.swap(m.last_reach);
+  LastReach last;
   // The mean that the last frame expected; 0: unknown.
   std::uint32_t mean = 0;
-  if (const auto expected = m.host_counts.get()->expected_entries; reach_known_ && expected > 0)
-    mean = std::max(1u, static_cast<std::uint32_t>(expected / shape_.tiles()));
+  if (reach_of_) {
+    const auto expected = m.host_counts.get()->expected_entries;
+    if (expected > 0)
+      mean = std::max(1u, static_cast<std::uint32_t>(expected / reach_of_->tiles()));
+    last = {
+        .reach = m.last_reach.get(), .tiles_x = reach_of_->tiles_x, .tiles_y = reach_of_->tiles_y};
+    // The grid of a sub-frame is that of the last frame, though its picture lies elsewhere in it.
+    if (kind == FrameKind::key)
+      last.from_px =
+          make_int2(reach_of_->left_px - shape_.left_px, reach_of_->top_px - shape_.top_px);
+  }
   launch_split({.shape = shape_,
                 .range = m.range.get(),
-                .reach_known = reach_known_,
+                .last_reach = last,
                 .reach = m.reach.get(),
                 .tasks = m.tasks.get(),
                 .tile_slices = m.tile_slices.get(),
@@ -288,6 +341,7 @@ void CudaView::split() {
                 .mean_list = mean,
                 .split = settings_.split_tasks},
                stream_.get());
+  reach_of_ = shape_;
 }
 
 void CudaView::blend(const FrameRequest& request) {
@@ -310,6 +364,7 @@ void CudaView::blend(const FrameRequest& request) {
                 .finish = finish_of(settings_.pipeline),
                 .reach = m.reach.get(),
                 .counts = m.counts.get(),
+                .loose = group_.loose,
                 .count_pairs = settings_.count_pairs,
                 .warps = blend_warps_},
                stream);
@@ -320,6 +375,7 @@ void CudaView::blend(const FrameRequest& request) {
                     .consumed = m.consumed.get(),
                     .entries = m.entries.get(),
                     .ends = ends,
+                    .loose = group_.loose,
                     .finish = finish_of(settings_.pipeline),
                     .background = background,
                     .rgb = m.rgb.get(),

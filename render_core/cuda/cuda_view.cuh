@@ -30,30 +30,44 @@ class CudaView final : public View {
   [[nodiscard]] bool outdated() const override { return paged_ && paged_->outdated(); }
 
  private:
-  void set_shape(glm::ivec2 size_px, int tile_side);
-  void make_room(glm::ivec2 size_px);
+  /// What sub-frames need to know of their key frame.
+  struct Group {
+    bool loose = false;       // lists are as in BlendParams::loose
+    glm::ivec2 corner_px{0};  // of the key frame's picture in the grid
+    ListSlack slack;
+    unsigned sub_frames = 0;
+  };
+
+  void set_shape(glm::ivec2 size_px, const FramePlan& plan, int tile_side);
+  void make_room(glm::ivec2 size_px, const FramePlan& plan);
   enum class Headroom { none, some };
   void reserve(Headroom headroom);
   bool needs_more_room();
   void forget_frames();
-  [[nodiscard]] FrameView draw(const FrameRequest& request, const FramePlan& plan);
+  [[nodiscard]] std::optional<FrameView> draw(const FrameRequest& request, const FramePlan& plan);
   void draw_key(const FrameRequest& request, const FramePlan& plan);
-  void draw_sub(const FrameRequest& request);
+  [[nodiscard]] bool draw_sub(const FrameRequest& request, const FramePlan& plan);
+  void project_group(const Camera& camera);
+  [[nodiscard]] bool lists_hold();
   void draw_vanilla(const FrameRequest& request);
   [[nodiscard]] SceneArrays scene_arrays() const;
   [[nodiscard]] TreeCut cut_tree(const FrameRequest& request, const FramePlan& plan);
-  [[nodiscard]] Occlusion want_occlusion(const Camera& camera);
+  void note_ends(const Camera& camera);
+  [[nodiscard]] Occlusion want_occlusion(const ListRequest& listed, const FramePlan& plan);
   void list_tiles(const ListRequest& request);
-  void split();
+  void split(FrameKind kind);
   void blend(const FrameRequest& request);
   void deliver();
   [[nodiscard]] FrameView finished(FrameKind kind, float near_z);
+  [[nodiscard]] glm::ivec2 corner_px() const { return {shape_.left_px, shape_.top_px}; }
+  [[nodiscard]] bool follows() const { return settings_.pipeline == Pipeline::catgs; }
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;
   int processors_;
   ViewSettings settings_;
   Stream stream_;
+  Event projected_{cudaEventDisableTiming};                          // strays are counted
   Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame has arrived
   StageTimes times_;
   FrameDriver driver_;
@@ -65,10 +79,13 @@ class CudaView final : public View {
   VanillaPipeline vanilla_;
   int blend_warps_;
 
-  // These say what memory_ holds of the last frame.
-  bool reach_known_ = false;
-  std::optional<Camera> ends_of_;  // the camera whose part_ends are known
+  // What memory_ holds of the last frame.
+  std::optional<FrameShape> reach_of_;  // whose reach is known
+  std::optional<LastPicture> ends_of_;  // whose part_ends are known
+  bool windows_ = false;                // rows of windows have room
   float mean_inverse_depth_ = 0.0f;
+
+  Group group_;
 };
 
 }  // namespace catgs::cuda

@@ -21,11 +21,19 @@ constexpr int blocks_per_processor = 8;
 __device__ bool is_hidden(const CullParams& p, const Cluster& cluster) {
   if (p.occlusion.part == nullptr) return false;
   const glm::vec3 &c = cluster.centre, &h = cluster.half_extent;
-  const auto box = math::cluster_box<float>(p.camera.now.single, {c.x, c.y, c.z}, {h.x, h.y, h.z},
-                                            cluster.reach);
-  return box.nearest > 0.0f &&
-         p.occlusion.hides(p.shape, make_float2(box.low_px.x, box.low_px.y),
-                           make_float2(box.high_px.x, box.high_px.y), box.nearest);
+  const auto box_in = [&](const math::CameraModel<float>& camera) {
+    return math::cluster_box<float>(camera, {c.x, c.y, c.z}, {h.x, h.y, h.z}, cluster.reach);
+  };
+  auto box = box_in(p.camera.now.single);
+  const float nearest = box.nearest;
+  if (p.sweeps) {
+    const auto end = box_in(p.camera.end);
+    if (!(end.nearest > 0.0f)) return false;
+    box.low_px = {fminf(box.low_px.x, end.low_px.x), fminf(box.low_px.y, end.low_px.y)};
+    box.high_px = {fmaxf(box.high_px.x, end.high_px.x), fmaxf(box.high_px.y, end.high_px.y)};
+  }
+  return nearest > 0.0f && p.occlusion.hides(p.shape, make_float2(box.low_px.x, box.low_px.y),
+                                             make_float2(box.high_px.x, box.high_px.y), nearest);
 }
 
 // Separate from the selection kernel, whose few blocks would test one cluster after another.
@@ -68,12 +76,7 @@ __global__ void __launch_bounds__(block_size) mask_kernel(const CullParams p) {
       const Splat splat =
           make_splat<sweeps>(p.scene, p.camera, p.shape, i, load_centre(p.scene, i));
       visible =
-          splat.in_view &&
-          !p.occlusion.hides(
-              p.shape,
-              make_float2(splat.centre_px.x - splat.half_px.x, splat.centre_px.y - splat.half_px.y),
-              make_float2(splat.centre_px.x + splat.half_px.x, splat.centre_px.y + splat.half_px.y),
-              splat.depth);
+          splat.in_view && !p.occlusion.hides(p.shape, splat.low_px, splat.high_px, splat.depth);
     }
     const unsigned word = __ballot_sync(~0u, visible);
     if (threadIdx.x % warp_size == 0) p.mask[rank * warps + threadIdx.x / warp_size] = word;

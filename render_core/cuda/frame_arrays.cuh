@@ -9,11 +9,12 @@
 
 namespace catgs::cuda {
 
-/// A splat's colour. Its rounding alone leaves 77 dB.
+/// A splat's colour, and the radius of a circle that holds it, px. The colour's rounding alone
+/// leaves 77 dB.
 struct __align__(8) PackedColour {
   __half2 red_green;
   __half blue;
-  __half unused;
+  __half radius_px;  // rounded up
 };
 
 /// The fields of one projected Gaussian that blending needs: one 32-byte sector.
@@ -40,6 +41,7 @@ struct FrameCounts {
   // Counts of each frame.
   std::uint32_t nearness = 0;  // inverted bits of the smallest counted depth; 0: there is none
   std::uint32_t sampled = 0;   // counted Gaussians; inverse_depths is their sum
+  std::uint32_t strays = 0;    // sub-frames of catgs: see project.cuh
   unsigned long long inverse_depths = 0;     // in units of 1 / (near_z * inverse_depth_scale)
   std::uint32_t list_max = 0;                // longest tile list
   std::uint32_t queued[queue_classes] = {};  // tasks of the blend; class c begins at c * tiles
@@ -55,6 +57,7 @@ struct FrameCounts {
 struct HostCounts {
   std::uint32_t visible = 0;
   std::uint32_t list_entries = 0;
+  std::uint32_t strays = 0;  // of a sub-frame, where they are more than most_strays
 };
 
 /// Side of the tiles that have lists. A list entry says which of the tile's 8x4 px blocks its splat
@@ -74,9 +77,13 @@ struct __align__(8) TileEntry {
   std::uint32_t blocks;  // that the splat reaches
 };
 
-/// The picture, its tiles, and the bounds of the frame's buffers.
+/// The picture, its grid of tiles, and the bounds of the frame's buffers. Stages count pixels from
+/// the grid's corner. The grid of a group with a window is larger than its pictures, and holds each
+/// of them somewhere: see TileGrid::follows. Otherwise it is that of the picture.
 struct FrameShape {
-  int width_px = 0, height_px = 0;
+  int width_px = 0, height_px = 0;            // of the picture
+  int left_px = 0, top_px = 0;                // the picture's corner in the grid
+  int grid_width_px = 0, grid_height_px = 0;  // what the tiles cover
   int tiles_x = 0, tiles_y = 0;
   std::uint32_t visible_bound = 0;  // room for visible Gaussians
   std::uint32_t list_bound = 0;     // room for list entries

@@ -2,6 +2,8 @@
 #include <limits>
 #include <utility>
 
+#include <glm/geometric.hpp>
+
 #include "render_core/cuda/bin.cuh"
 #include "render_core/cuda/cuda_check.h"
 #include "render_core/cuda/cull.cuh"
@@ -19,13 +21,27 @@ bool is_narrow(const FrameShape& shape) {
 
 }  // namespace
 
+ListSlack list_slack(const Camera& camera, const FramePlan& plan) {
+  // A forecast of constant velocity is wrong by so much of the way, as recorded heads show.
+  constexpr float wrong_share = 0.15f, far_px = 2.0f, most_px = 16.0f;
+  const float way =
+      glm::distance(camera.world_from_camera.position, plan.window_end.world_from_camera.position);
+  return {.far_px = far_px, .near_px = wrong_share * way * camera.focal_px.x, .most_px = most_px};
+}
+
 ListRequest::ListRequest(const Camera& camera, const FramePlan& plan,
-                         const SpeculationSettings& settings)
-    : cameras{.now = make_camera_pair(camera), .end = {}, .near_z = camera.near_z},
-      culler(camera, plan),
+                         const SpeculationSettings& settings, std::optional<glm::ivec2> corner_px)
+    : cameras{.now = in_grid(make_camera_pair(camera), corner_px.value_or(glm::ivec2(0))),
+              .end = {},
+              .near_z = camera.near_z},
+      culler(camera, plan, corner_px && plan.window > 0 ? grid_margin_px : 0),
       sweeps(plan.window > 0),
       min_depth(speculation_min_depth(settings, camera.near_z)) {
-  cameras.end = sweeps ? make_camera_pair(plan.window_end).single : cameras.now.single;
+  cameras.end = cameras.now.single;
+  if (!sweeps) return;
+  const glm::ivec2 end_px = corner_px.value_or(glm::ivec2(0)) - plan.end_shift_px;
+  cameras.end = in_grid(make_camera_pair(plan.window_end), end_px).single;
+  if (corner_px) slack = list_slack(camera, plan);
 }
 
 SortScratch ListBuilder::scratch() const {
@@ -71,7 +87,9 @@ void ListBuilder::project(const ListRequest& request, const FrameShape& shape,
                   .tile_count = m.tile_count.get(),
                   .spans = m.spans.get(),
                   .path = request.sweeps ? m.path.get() : nullptr,
-                  .order = m.order.get()},
+                  .slack = request.slack,
+                  .order = m.order.get(),
+                  .host_counts = nullptr},
                  request.sweeps ? Listing::trails : Listing::ellipses, stream);
 }
 
@@ -108,6 +126,7 @@ void ListBuilder::emit_as(const ListRequest& request, const FrameShape& shape,
                      .tile_count = m.tile_count.get(),
                      .spans = m.spans.get(),
                      .path = request.sweeps ? m.path.get() : nullptr,
+                     .slack = request.slack,
                      .occlusion = request.occlusion,
                      .splat_depth = m.splat_depth.get(),
                      .in_window = sorts_in_one_pass(shape) ? m.in_window.get() : nullptr,

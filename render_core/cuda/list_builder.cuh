@@ -14,7 +14,9 @@ namespace catgs::cuda {
 
 /// A frame as the stages that make lists see it.
 struct ListRequest {
-  ListRequest(const Camera& camera, const FramePlan& plan, const SpeculationSettings& settings);
+  /// `corner_px`: of the picture in a grid that follows the camera; nothing: the grid is fixed.
+  ListRequest(const Camera& camera, const FramePlan& plan, const SpeculationSettings& settings,
+              std::optional<glm::ivec2> corner_px = std::nullopt);
 
   SceneArrays scene{};
   std::optional<TreeCut> cut{};  // of a scene in pages
@@ -22,8 +24,12 @@ struct ListRequest {
   ListCuller culler;
   bool sweeps;      // trails are listed, not ellipses
   float min_depth;  // as in ProjectParams
+  ListSlack slack{};
   Occlusion occlusion{};
 };
+
+/// How much wider than their paths splats are listed in a group whose grid follows the camera.
+ListSlack list_slack(const Camera& camera, const FramePlan& plan);
 
 /// The stages that make the lists of Gaussians per tile, in order, in the memory of a View. All
 /// throw CudaError. They only launch work, except that CUB's sorts first wait for a count of an

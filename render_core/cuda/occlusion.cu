@@ -8,26 +8,37 @@ constexpr int block_size = 128;
 
 /// The deepest end of the parts around a place in the last picture; infinity beyond its edge.
 __device__ float deepest_end(const OcclusionParams& p, float x_px, float y_px) {
-  const int parts_x = (p.shape.width_px + part_side_px - 1) / part_side_px;
-  const int parts_y = (p.shape.height_px + part_side_px - 1) / part_side_px;
+  const FrameShape& last = p.last.shape;
+  const int left = last.left_px / part_side_px, top = last.top_px / part_side_px;
+  const int right = (last.left_px + last.width_px - 1) / part_side_px;
+  const int bottom = (last.top_px + last.height_px - 1) / part_side_px;
   const float x = floorf(x_px / part_side_px), y = floorf(y_px / part_side_px);
-  if (!(x >= 0.0f && y >= 0.0f && x < static_cast<float>(parts_x) &&
-        y < static_cast<float>(parts_y)))
+  if (!(x >= static_cast<float>(left) && y >= static_cast<float>(top) &&
+        x <= static_cast<float>(right) && y <= static_cast<float>(bottom)))
     return INFINITY;
   float deepest = 0.0f;
   for (int dy = -p.radius; dy <= p.radius; ++dy) {
     for (int dx = -p.radius; dx <= p.radius; ++dx) {
       const int at_x = static_cast<int>(x) + dx, at_y = static_cast<int>(y) + dy;
-      if (at_x < 0 || at_y < 0 || at_x >= parts_x || at_y >= parts_y) continue;
-      deepest = fmaxf(deepest, p.last_ends[part_position(p.shape, at_x, at_y)]);
+      if (at_x < left || at_y < top || at_x > right || at_y > bottom) continue;
+      deepest = fmaxf(deepest, p.last_ends[part_position(last, at_x, at_y)]);
     }
   }
   return deepest;
 }
 
+/// The limit of the part around a place, as a view depth of the frame's camera.
 __device__ float limit_of(const OcclusionParams& p, float x_px, float y_px) {
-  return math::occlusion_limit<float>(p.now, p.last, {x_px, y_px},
-                                      [&p](float x, float y) { return deepest_end(p, x, y); });
+  const auto seen_from = [&](const math::CameraModel<float>& camera) {
+    return math::occlusion_limit<float>(camera, p.last.camera, {x_px, y_px},
+                                        [&p](float x, float y) { return deepest_end(p, x, y); });
+  };
+  const float now = seen_from(p.now);
+  if (!p.sweeps || !(now < INFINITY)) return now;
+  const float end = seen_from(p.end);
+  if (!(end < INFINITY)) return end;
+  const auto ray = math::carried_ray<float>(p.end, p.now, {x_px, y_px});
+  return fmaxf(now, ray.at(end).z);
 }
 
 __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionParams p) {
@@ -36,8 +47,9 @@ __global__ void __launch_bounds__(block_size) occlusion_kernel(const OcclusionPa
   if (tile >= p.shape.tiles()) return;
   const int part = static_cast<int>(at % parts_per_tile);
   const int2 corner = part_corner_px(p.shape, tile, part);
-  float limit = 0.0f;  // nothing is seen beyond the picture
-  if (in_picture(p.shape, corner.x, corner.y))
+  float limit = 0.0f;  // nothing is seen beyond the pictures
+  if (corner.x > p.shown.x - part_side_px && corner.y > p.shown.y - part_side_px &&
+      corner.x < p.shown.z && corner.y < p.shown.w)
     limit = limit_of(p, static_cast<float>(corner.x) + 0.5f * part_side_px,
                      static_cast<float>(corner.y) + 0.5f * part_side_px);
   p.part[at] = limit;

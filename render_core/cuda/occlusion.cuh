@@ -11,17 +11,27 @@ struct Occlusion {
   const float* part = nullptr;   // [tiles][parts_per_tile], view depth; null: nothing is hidden
   const float2* tile = nullptr;  // [tiles], the smallest and the largest of a tile
 
-  /// Whether a splat with this box, px in the picture, is behind the limits of all parts it meets.
+  /// Whether a splat with this box, px in the grid, is behind the limits of all parts it meets.
   __device__ bool hides(const FrameShape& shape, float2 low_px, float2 high_px, float depth) const;
 };
 
-/// Carries the ends of parts (see PartEnds) over to the next frame: math::occlusion_limit().
+/// What remains of a frame for occlusion in the next one.
+struct LastPicture {
+  math::CameraModel<float> camera;  // draws into its grid
+  FrameShape shape;
+};
+
+/// Carries the ends of parts (see PartEnds) over to the next frame: math::occlusion_limit(). With a
+/// window, nothing is hidden that shows at its start or at its end.
 struct OcclusionParams {
-  FrameShape shape;  // of both frames
-  math::CameraModel<float> now, last;
+  FrameShape shape;
+  math::CameraModel<float> now, end;  // draw into the frame's grid; equal without a window
+  bool sweeps;                        // with a window
+  int4 shown;                         // box of all pictures of the window, px: low x, y, high x, y
+  LastPicture last;
   int radius;              // math::occlusion_radius(), not negative
-  const float* last_ends;  // [tiles][parts_per_tile]
-  float* part;             // likewise, Occlusion::part
+  const float* last_ends;  // [tiles of last][parts_per_tile]
+  float* part;             // [tiles][parts_per_tile], Occlusion::part
   float2* tile;            // [tiles], Occlusion::tile
 };
 void launch_occlusion(const OcclusionParams& params, cudaStream_t stream);
@@ -29,7 +39,7 @@ void launch_occlusion(const OcclusionParams& params, cudaStream_t stream);
 __device__ inline bool Occlusion::hides(const FrameShape& shape, float2 low_px, float2 high_px,
                                         float depth) const {
   if (part == nullptr) return false;
-  const int last_x = shape.width_px - 1, last_y = shape.height_px - 1;
+  const int last_x = shape.grid_width_px - 1, last_y = shape.grid_height_px - 1;
   const int left = max(0, static_cast<int>(low_px.x)),
             right = min(last_x, static_cast<int>(high_px.x));
   const int top = max(0, static_cast<int>(low_px.y)),

@@ -32,12 +32,13 @@ class PartPixels {
     y_px_ = corner.y + row_;
   }
 
-  /// Origin of the part: the pixel corner in its middle, px in the picture.
+  /// Origin of the part: the pixel corner in its middle, px in the grid.
   __device__ float origin_x() const { return static_cast<float>(x_px_ - column_ + middle); }
   __device__ float origin_y() const { return static_cast<float>(y_px_ - row_ + middle); }
   /// Whether any of the part is in the picture.
   __device__ bool shows(const FrameShape& shape) const {
-    return x_px_ - column_ < shape.width_px && y_px_ - row_ < shape.height_px;
+    const int x = x_px_ - column_ - shape.left_px, y = y_px_ - row_ - shape.top_px;
+    return x > -part_side_px && y > -part_side_px && x < shape.width_px && y < shape.height_px;
   }
   /// Number k of the half_lanes pixels that are the i-th of their lanes in half `half`.
   __device__ PartPixel part_pixel(const FrameShape& shape, int half, int i, int k) const {

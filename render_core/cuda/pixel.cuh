@@ -5,9 +5,10 @@
 
 namespace catgs::cuda {
 
-/// Whether a pixel is in the picture. Tiles may lie partly or wholly outside.
+/// Whether a pixel of the grid is in the picture. Tiles may lie partly or wholly outside.
 __device__ inline bool in_picture(const FrameShape& shape, int x_px, int y_px) {
-  return x_px >= 0 && y_px >= 0 && x_px < shape.width_px && y_px < shape.height_px;
+  const int x = x_px - shape.left_px, y = y_px - shape.top_px;
+  return x >= 0 && y >= 0 && x < shape.width_px && y < shape.height_px;
 }
 
 /// When a pixel is finished.
@@ -25,7 +26,8 @@ __device__ inline void show_pixel(float* rgb, const FrameShape& shape, int x_px,
   if (!in_picture(shape, x_px, y_px)) return;
   if (finish.fills) pixel = math::filled(pixel, finish.transmittance);
   const auto shown = math::resolve<float>(pixel, {background.x, background.y, background.z});
-  float* out = rgb + 3 * (static_cast<std::size_t>(y_px) * shape.width_px + x_px);
+  const int x = x_px - shape.left_px, y = y_px - shape.top_px;
+  float* out = rgb + 3 * (static_cast<std::size_t>(y) * shape.width_px + x);
   out[0] = shown.x;
   out[1] = shown.y;
   out[2] = shown.z;

@@ -19,9 +19,20 @@ struct ProjectParams {
   float* splat_depth;            // [visible_bound], the depth itself; null: not wanted
   std::uint32_t* tile_count;     // key frames: [visible_bound], number of its list entries
   TileSpans* spans;              // key frames: [visible_bound]
-  SplatPath* path;               // key frames with a window: [visible_bound]
-  std::uint32_t* order;          // key frames: [visible_bound], input of sort_by_depth()
+  // [visible_bound]. Key frames with a window set it. In sub-frames of catgs, it tells splats that
+  // their lists may miss: strays. Null in all other frames.
+  SplatPath* path;
+  ListSlack slack;          // of paths
+  std::uint32_t* order;     // key frames: [visible_bound], input of sort_by_depth()
+  HostCounts* host_counts;  // sub-frames with paths: strays are added
 };
+
+/// A splat strays when it is farther outside of its lists than this, px. What it shows at its rim
+/// is faint. With 3 px, blocks of 16x16 px fell to 25 dB.
+constexpr float stray_px = 0.5f;
+/// A sub-frame that misses no more than so many splats is drawn. A room has a million in view, and
+/// some near ones leave any path.
+constexpr std::uint32_t most_strays = 50;
 
 enum class Listing {
   none,      // a sub-frame: its lists exist already

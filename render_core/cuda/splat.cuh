@@ -17,8 +17,19 @@ inline CameraPair make_camera_pair(const Camera& camera) {
   return {math::convert<float>(precise), precise};
 }
 
+/// The camera whose picture has its corner at `corner_px` of what it draws, instead of at 0.
+inline CameraPair in_grid(CameraPair camera, glm::ivec2 corner_px) {
+  const auto move = [&](auto& model) {
+    model.principal_point_px.x += static_cast<float>(corner_px.x);
+    model.principal_point_px.y += static_cast<float>(corner_px.y);
+  };
+  move(camera.single);
+  move(camera.precise);
+  return camera;
+}
+
 /// The camera of a frame. For listing also the camera at the end of its window (the same if it has
-/// none).
+/// none). They draw into the frame's grid.
 struct FrameCameras {
   CameraPair now;  // its near_z is the near plane of the lists
   math::CameraModel<float> end;
@@ -31,12 +42,13 @@ constexpr float never = -1e30f;
 /// A Gaussian in the image plane, before its colour.
 struct Splat {
   float2 centre_px = {0.0f, 0.0f};
-  float2 half_px = {0.0f, 0.0f};  // of the box around it, if it is visible at all
+  float2 low_px = {0.0f, 0.0f}, high_px = {0.0f, 0.0f};  // box around it or its path, if in view
+  float radius_px = 0.0f;                                // of a circle around it, if in view
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
-  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, {}};
-  bool in_view = false;  // its box, or that of its path, meets the picture
+  SplatPath path = {0.0f, 0.0f, {1.0f, 0.0f, 1.0f}, never, 0.0f, 0.0f};
+  bool in_view = false;  // the box meets the grid
 };
 
 /// With `sweeps`, finds splats that are in view at some time of the window; otherwise those in view
@@ -75,16 +87,19 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   const float step_x = 0.5f * s.displacement.x, step_y = 0.5f * s.displacement.y;
   const float x = s.shape.centre_px.x + step_x, y = s.shape.centre_px.y + step_y;
   const float wide = half.x + fabsf(step_x), high = half.y + fabsf(step_y);
-  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.width_px) ||
-      y - high > static_cast<float>(shape.height_px)) {
+  if (x + wide < 0.0f || y + high < 0.0f || x - wide > static_cast<float>(shape.grid_width_px) ||
+      y - high > static_cast<float>(shape.grid_height_px)) {
     return out;
   }
   out.in_view = true;
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
-  out.half_px = make_float2(half.x, half.y);
+  out.low_px = make_float2(x - wide, y - high);
+  out.high_px = make_float2(x + wide, y + high);
+  out.radius_px = fmaxf(half.x, half.y);
   out.whitening = math::whitening(s.shape);
   if (in_front) out.log2_opacity = log2_opacity;
-  out.path = {s.displacement.x, s.displacement.y, s.outline, centre.log2_opacity, {}};
+  out.path = {s.displacement.x,    s.displacement.y,    s.outline,
+              centre.log2_opacity, s.shape.centre_px.x, s.shape.centre_px.y};
   return out;
 }
 

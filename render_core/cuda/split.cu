@@ -16,7 +16,7 @@ struct Cut {
   uint2 range;
   std::uint32_t reach;     // last frame's reach
   std::uint32_t expected;  // list entries that it is expected to look at
-  std::uint32_t slices;    // of the expected entries
+  std::uint32_t slices;    // of the expected entries; 0: the tile is not drawn
   std::uint32_t reserve;   // of the entries behind them
 
   __device__ std::uint32_t listed() const { return range.y - range.x; }
@@ -26,8 +26,18 @@ struct Cut {
   __device__ Cut whole() const { return {range, reach, listed(), 1, 0}; }
 };
 
+/// Whether a tile shows in the picture. The grid may be larger.
+__device__ bool shows(const FrameShape& shape, int column, int row) {
+  const int x = column * tile_side_px - shape.left_px, y = row * tile_side_px - shape.top_px;
+  return x > -tile_side_px && y > -tile_side_px && x < shape.width_px && y < shape.height_px;
+}
+
 __device__ Cut cut_of(const SplitParams& p, std::uint32_t t) {
-  const Cut cut_nowhere{p.range[t], p.reach_known ? p.reach[t] : ~0u, 0, 0, 0};
+  const int column = static_cast<int>(t) % p.shape.tiles_x;
+  const int row = static_cast<int>(t) / p.shape.tiles_x;
+  const std::uint32_t known = p.last_reach.reach != nullptr ? p.last_reach.under(column, row) : ~0u;
+  const Cut cut_nowhere{p.range[t], known, 0, 0, 0};
+  if (!shows(p.shape, column, row)) return cut_nowhere;
   Cut cut = cut_nowhere.whole();
   if (!p.split) return cut;
   const std::uint32_t length = slice_length(
@@ -212,8 +222,15 @@ __global__ void __launch_bounds__(composite_block) composite_kernel(const Compos
   if (part_end > first) atomicMax(&p.reach[tile], part_end - first);
   // A part beyond the picture's edge counts as finished, and has looked at nothing.
   if (part_finished && part_end == 0) return;
-  p.ends.note(tile, first_part + thread, part_finished,
-              part_finished ? p.entries[part_end - 1].slot : 0);
+  if (p.ends.depth == nullptr) return;
+  float depth = INFINITY;
+  if (part_finished) {
+    const std::uint32_t entries = p.loose ? min(loose_end_entries, part_end - first) : 1;
+    depth = 0.0f;
+    for (std::uint32_t back = 1; back <= entries; ++back)
+      depth = fmaxf(depth, p.ends.splat_depth[p.entries[part_end - back].slot]);
+  }
+  p.ends.note(tile, first_part + thread, depth);
 }
 
 }  // namespace

@@ -4,6 +4,29 @@
 
 namespace catgs::cuda {
 
+/// How much of each tile's list the View's last frame looked at. Its grid may lie elsewhere in the
+/// picture.
+struct LastReach {
+  const std::uint32_t* reach = nullptr;  // [tiles of the last grid]; null: unknown
+  int tiles_x = 0, tiles_y = 0;
+  int2 from_px = {0, 0};  // of this grid's corner in the last one
+
+  /// The most that tiles under this one reach.
+  __device__ std::uint32_t under(int column, int row) const {
+    const auto tile_at = [](int px) { return px >= 0 ? px / tile_side_px : -1; };
+    const int left = column * tile_side_px + from_px.x, top = row * tile_side_px + from_px.y;
+    std::uint32_t most = 0;
+    if (left >= tiles_x * tile_side_px || top >= tiles_y * tile_side_px || left <= -tile_side_px ||
+        top <= -tile_side_px)
+      return ~0u;
+    for (int y = max(tile_at(top), 0); y <= min(tile_at(top + tile_side_px - 1), tiles_y - 1); ++y)
+      for (int x = max(tile_at(left), 0); x <= min(tile_at(left + tile_side_px - 1), tiles_x - 1);
+           ++x)
+        most = max(most, reach[y * tiles_x + x]);
+    return most;
+  }
+};
+
 /// Cuts long tile lists into slices of about twice the mean length (paper 3.4, Algorithm 1). With l
 /// the length of a slice, a tile longer than 2 l becomes ceil(length / l) tasks of equal length.
 ///
@@ -16,9 +39,9 @@ namespace catgs::cuda {
 /// slices find no room go without: first without slices of the rest, then without any.
 struct SplitParams {
   FrameShape shape;
-  const uint2* range;          // [tiles]
-  bool reach_known;            // `reach` is that of the View's last frame
-  std::uint32_t* reach;        // [tiles], zeroed here
+  const uint2* range;  // [tiles]
+  LastReach last_reach;
+  std::uint32_t* reach;        // [tiles], set to zero
   BlendTask* tasks;            // [task_bound(shape)]
   uint2* tile_slices;          // [tiles], first slice and number of slices; 0: one task
   std::uint32_t* queue;        // [queue_bound(shape)], see FrameCounts
@@ -60,6 +83,7 @@ struct CompositeParams {
   const std::uint32_t* consumed;
   const TileEntry* entries;  // as in BlendParams
   PartEnds ends;
+  bool loose;  // as in BlendParams
   Finish finish;
   float3 background;
   float* rgb;

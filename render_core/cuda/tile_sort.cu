@@ -153,8 +153,7 @@ __global__ void __launch_bounds__(block_size) scatter_kernel(const TileSortParam
 }  // namespace
 
 std::size_t window_tiles(const FrameShape& shape) {
-  if (!sorts_in_one_pass(shape)) return 0;
-  return std::size_t{windows_of(shape.list_bound)} * shape.tiles();
+  return std::size_t{windows_of(shape.list_bound)} * std::min(shape.tiles(), most_sorted_tiles);
 }
 
 void launch_tile_sort(const TileSortParams& params, cudaStream_t stream) {

@@ -17,7 +17,7 @@ inline bool sorts_in_one_pass(const FrameShape& shape) {
   return shape.tiles() <= most_sorted_tiles;
 }
 
-/// Size of TileSortParams::in_window; 0 for pictures that do not need it.
+/// Size of TileSortParams::in_window for this shape, and for all with fewer tiles.
 std::size_t window_tiles(const FrameShape& shape);
 
 /// Sorts list entries by tile in one pass: a counting sort. It is stable, so each tile keeps its

@@ -12,9 +12,21 @@ struct __align__(16) SplatPath {
   float dx, dy;                      // px, from the record's centre
   math::Whitening<float> whitening;  // of the outline
   float log2_opacity;                // the record has none while the splat is behind the near plane
-  float unused[2];
+  float x, y;                        // px, the record's centre in the key frame
 };
 static_assert(sizeof(SplatPath) == 32);
+
+constexpr float least_slack_px = static_cast<float>(listing_slack_px);
+
+/// How much wider than its path a splat is listed, so that a camera may leave its forecast: a
+/// wrong position moves near splats the most.
+struct ListSlack {
+  float far_px = 0.0f;   // what a wrong direction adds, at any depth
+  float near_px = 0.0f;  // px times world units: what a wrong position adds at depth 1
+  float most_px = 0.0f;
+
+  __device__ float at(float depth) const { return fminf(far_px + near_px / depth, most_px); }
+};
 
 /// The tiles that an outline (math::Ellipse or math::Trail) reaches: rows first_row…last_row, and
 /// in each row columns by `columns`.
@@ -32,12 +44,13 @@ struct TileFootprint {
   __device__ int2 columns(int row) const {
     constexpr float tile = tile_side_px;
     const float top = static_cast<float>(row) * tile + 0.5f;
-    const float bottom = fminf(top + (tile - 1.0f), static_cast<float>(shape.height_px) - 0.5f);
+    const float bottom =
+        fminf(top + (tile - 1.0f), static_cast<float>(shape.grid_height_px) - 0.5f);
     const auto cut = math::columns_in_band(outline, top - slack_px - centre_px.y,
                                            bottom + slack_px - centre_px.y);
     const float low = cut.low + centre_px.x - slack_px;
     const float high = cut.high + centre_px.x + slack_px;
-    if (cut.low > cut.high || low > static_cast<float>(shape.width_px) - 0.5f)
+    if (cut.low > cut.high || low > static_cast<float>(shape.grid_width_px) - 0.5f)
       return make_int2(0, -1);
     const float first = ceilf((low - (tile - 0.5f)) * (1.0f / tile));
     const float last = floorf((high - 0.5f) * (1.0f / tile));
@@ -85,7 +98,7 @@ struct TileFootprint {
 /// Footprint of a splat in its present place. It reaches nothing when `log2_opacity` is too low.
 __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
     float2 centre_px, const math::Whitening<float>& w, float log2_opacity, const FrameShape& shape,
-    float slack_px = listing_slack_px) {
+    float slack_px = least_slack_px) {
   const float reach = math::reach_of(log2_opacity);
   const math::Vec2<float> half = math::half_extent(w, fmaxf(reach, 0.0f));
   TileFootprint<math::Ellipse<float>> f;
@@ -101,7 +114,7 @@ __device__ inline TileFootprint<math::Ellipse<float>> make_footprint(
 /// Footprint of a splat's path through a window.
 __device__ inline TileFootprint<math::Trail<float>> make_footprint(
     float2 centre_px, const SplatPath& path, const FrameShape& shape,
-    float slack_px = listing_slack_px) {
+    float slack_px = least_slack_px) {
   const math::Whitening<float>& w = path.whitening;
   const float reach = fmaxf(math::reach_of(path.log2_opacity), 0.0f);
   const float half_x = math::half_extent(w, reach).x;
@@ -115,15 +128,16 @@ __device__ inline TileFootprint<math::Trail<float>> make_footprint(
   return f;
 }
 
-/// TileEntry::blocks of a splat in its present place. Cuts it into columns of blocks, which a tile
-/// has fewer of than rows.
+/// TileEntry::blocks of a splat that stays within `slack_px` of its place. Cuts it into columns of
+/// blocks, which a tile has fewer of than rows.
 __device__ inline std::uint32_t blocks_of(float2 centre_px, const math::Whitening<float>& w,
-                                          float log2_opacity, int column, int row) {
-  constexpr float width = block_width_px, height = block_height_px, slack = listing_slack_px;
+                                          float log2_opacity, int column, int row,
+                                          float2 slack_px = {least_slack_px, least_slack_px}) {
+  constexpr float width = block_width_px, height = block_height_px;
   const float reach = math::reach_of(log2_opacity);
   if (reach < 0.0f) return 0;
   const math::Ellipse<float> turned = math::make_transposed_ellipse(w, reach);
-  const float half_width = math::half_extent(w, reach).x + slack;
+  const float half_width = math::half_extent(w, reach).x + slack_px.x;
   const float left = static_cast<float>(column * tile_side_px) - centre_px.x;
   const float top = static_cast<float>(row * tile_side_px) - centre_px.y;
   const int first = max(__float2int_rd((-half_width - left) * (1.0f / width)), 0);
@@ -131,12 +145,12 @@ __device__ inline std::uint32_t blocks_of(float2 centre_px, const math::Whitenin
   std::uint32_t blocks = 0;
   for (int k = first; k <= last; ++k) {
     const float x = left + static_cast<float>(k) * width + 0.5f;
-    const auto cut = math::columns_in_band(turned, x - slack, x + (width - 1.0f) + slack);
+    const auto cut = math::columns_in_band(turned, x - slack_px.x, x + (width - 1.0f) + slack_px.x);
     // Row j is reached if its last pixel centre is not above the cut, and its first one not below.
     const int low =
-        max(__float2int_ru((cut.low - top - slack - (height - 0.5f)) * (1.0f / height)), 0);
-    const int high =
-        min(__float2int_rd((cut.high - top + slack - 0.5f) * (1.0f / height)), blocks_down - 1);
+        max(__float2int_ru((cut.low - top - slack_px.y - (height - 0.5f)) * (1.0f / height)), 0);
+    const int high = min(__float2int_rd((cut.high - top + slack_px.y - 0.5f) * (1.0f / height)),
+                         blocks_down - 1);
     if (cut.low > cut.high || low > high) continue;
     constexpr std::uint32_t every_row = 0x11111111u;
     static_assert(blocks_across == 4 && blocks_down == 8);
@@ -145,6 +159,35 @@ __device__ inline std::uint32_t blocks_of(float2 centre_px, const math::Whitenin
     blocks |= rows << k;
   }
   return blocks;
+}
+
+/// A path so short that its outline, wider by half of it, stands for its trail: that is cut faster.
+__device__ inline bool is_short(const SplatPath& path) {
+  constexpr float most_px = 6.0f;
+  return fmaxf(fabsf(path.dx), fabsf(path.dy)) <= most_px;
+}
+__device__ inline float2 middle_of(const SplatPath& path) {
+  return make_float2(path.x + 0.5f * path.dx, path.y + 0.5f * path.dy);
+}
+
+/// Calls visit() with the footprint of a path.
+template <class Visit>
+__device__ auto with_footprint(const SplatPath& path, const FrameShape& shape, float slack_px,
+                               const Visit& visit) {
+  if (!is_short(path))
+    return visit(make_footprint(make_float2(path.x, path.y), path, shape, slack_px));
+  const float half_path_px = 0.5f * fmaxf(fabsf(path.dx), fabsf(path.dy));
+  return visit(make_footprint(middle_of(path), path.whitening, path.log2_opacity, shape,
+                              slack_px + half_path_px));
+}
+
+/// TileEntry::blocks of a splat that stays within `slack_px` of its path.
+__device__ inline std::uint32_t blocks_of(const SplatPath& path, const FrameShape& shape,
+                                          int column, int row, float slack_px) {
+  if (!is_short(path))
+    return make_footprint(make_float2(path.x, path.y), path, shape, slack_px).blocks(column, row);
+  return blocks_of(middle_of(path), path.whitening, path.log2_opacity, column, row,
+                   make_float2(slack_px + 0.5f * fabsf(path.dx), slack_px + 0.5f * fabsf(path.dy)));
 }
 
 /// The tiles of a small splat, row by row. Most splats are small, so their tiles are kept between

@@ -79,7 +79,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   if (tiles == 0) return;
   const auto colour =
       shade(load_sh(p.scene, i), p.scene.sh_degree, math::view_direction<float>(camera.eye, mean));
-  p.records[i] = {centre, math::whitening(g), log2_opacity, pack(colour)};
+  p.records[i] = {centre, math::whitening(g), log2_opacity, pack(colour, 0.0f)};
   p.depth[i] = depth;
   p.box[i] = box;
   p.tile_count[i] = tiles;

@@ -5,10 +5,6 @@
 
 namespace catgs::cuda {
 
-bool speculates(const ViewSettings& settings) {
-  return settings.pipeline == Pipeline::paper && settings.speculation.initial_window > 0;
-}
-
 std::size_t ViewSizes::scratch_bytes() const {
   if (shape.tiles() == 0) return 0;  // the View has no such lists
   return std::max(sort_scratch_bytes(shape), cull_scratch_bytes(scene.frame_clusters));

@@ -12,15 +12,13 @@
 
 namespace catgs::cuda {
 
-/// Whether a View has sub-frames.
-bool speculates(const ViewSettings& settings);
-
 /// The sizes that the rows of ViewMemory depend on.
 struct ViewSizes {
   FrameShape shape;
   SceneArrays scene;
   bool in_pages;  // the scene is
   ViewSettings settings;
+  bool windows = false;  // groups have had windows
 
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(shape.width_px) * static_cast<std::size_t>(shape.height_px);
@@ -70,7 +68,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
   DeviceRow<U32> cull_before{this, Life::frame, [](S s) { return s.scene.frame_clusters; }};
   DeviceRow<TileSpans> spans{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<SplatPath> path{this, Life::frame,
-                            [](S s) { return speculates(s.settings) ? s.shape.visible_bound : 0; }};
+                            [](S s) { return s.windows ? s.shape.visible_bound : 0; }};
   DeviceRow<U32> tile_count{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> first{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
   DeviceRow<U32> other_depth{this, Life::frame, [](S s) { return s.shape.visible_bound; }};
@@ -92,6 +90,7 @@ struct ViewMemory : MemoryTable<ViewSizes> {
 
   // Tasks of the blend.
   DeviceRow<U32> reach{this, Life::view, [](S s) { return s.shape.tiles(); }};
+  DeviceRow<U32> last_reach{this, Life::view, [](S s) { return s.shape.tiles(); }};
   DeviceRow<BlendTask> tasks{this, Life::frame, [](S s) { return task_bound(s.shape); }};
   DeviceRow<U32> queue{this, Life::frame, [](S s) { return queue_bound(s.shape); }};
   DeviceRow<uint2> tile_slices{this, Life::frame, [](S s) { return s.shape.tiles(); }};

@@ -5,6 +5,7 @@
 
 #include "render_core/frame/renderer.h"
 #include "render_core/motion/frame_groups.h"
+#include "render_core/motion/window_gain.h"
 
 namespace catgs {
 
@@ -13,13 +14,16 @@ namespace catgs {
 class FrameDriver {
  public:
   /// Draws one frame by its plan and waits for it. Need not fill in kind and window of the
-  /// statistics. Throws where it fails.
-  using Draw = std::function<FrameView(const FramePlan&)>;
+  /// statistics. Nothing, where the lists of a sub-frame's group turn out not to hold: it is then
+  /// asked for a key frame. Throws where it fails.
+  using Draw = std::function<std::optional<FrameView>(const FramePlan&)>;
   /// Drops what a core keeps from frame to frame, after a failure.
   using Forget = std::function<void()>;
 
+  enum class CatgsWindows { none, some };  // whether the core's Pipeline::catgs has windows
+
   /// Throws as check_speculation().
-  explicit FrameDriver(const ViewSettings& settings);
+  explicit FrameDriver(const ViewSettings& settings, CatgsWindows catgs = CatgsWindows::none);
 
   /// As View::render().
   RenderStatus render(const FrameRequest& request, FrameView& frame, const Draw& draw,
@@ -27,10 +31,18 @@ class FrameDriver {
 
  private:
   [[nodiscard]] FramePlan plan(const FrameRequest& request);
+  [[nodiscard]] FramePlan with_window_if_it_pays(const FramePlan& plan, const Camera& camera);
+  void note_time(const FrameStats& stats);
 
   ViewSettings settings_;
+  bool groups_frames_;
   FrameGroups groups_;
-  float nearest_depth_ = 0.0f;  // of the last frame
+  WindowGain gain_;
+  bool has_window_ = false;  // catgs: the present group has its window
+  bool refused_ = false;     // catgs: the last group's lists did not hold
+  int group_frames_ = 0;     // catgs: frames of the present group, drawn with a window or not
+  int sub_frames_left_ = 0;  // of the present window
+  float depth_ = 0.0f;       // of the last frame, as FrameGroups::plan() takes it
 };
 
 }  // namespace catgs

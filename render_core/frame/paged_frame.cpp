@@ -7,13 +7,14 @@
 namespace catgs {
 
 PagedFrame::PagedFrame(PagedTree& tree, const ViewSettings& settings)
-    : tree_(tree), keeps_pages_(settings.pipeline == Pipeline::paper), watch_(tree.watch()) {
+    : tree_(tree), watch_(tree.watch()) {
   if (settings.pipeline == Pipeline::vanilla)
     throw InputError("--pipeline vanilla", "", "draws whole scenes only, not parts of a tree",
                      "leave --detail and --scene-memory out");
 }
 
 void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
+  keeps_pages_ = plan.window > 0;
   cameras_ = {request.camera};
   if (plan.window > 0) cameras_.push_back(plan.window_end);
   ViewDemand demand{cameras_, request.detail_px, request.waits_for_pages};

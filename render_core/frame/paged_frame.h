@@ -34,7 +34,7 @@ class PagedFrame {
 
  private:
   PagedTree& tree_;
-  bool keeps_pages_;  // for sub-frames
+  bool keeps_pages_ = false;  // for sub-frames
   std::shared_ptr<Watch> watch_;
   std::shared_ptr<const PageTable> table_;
   std::uint64_t changes_ = 0;  // of the watch, when the table was taken

@@ -33,9 +33,14 @@ enum class Pipeline {
   exact,    // exact ellipse/tile culling; the same image as the reference
   paper,    // CaT-GS as published: key frames (same image as `exact`), then sub-frames
   // The server's: `exact` without what the last frame shows to be hidden. A pixel is finished at
-  // least_shown.
+  // least_shown. The CUDA core draws sub-frames where that saves time.
   catgs,
 };
+
+/// Whether frames of a pipeline may follow a key frame as its sub-frames.
+constexpr bool has_groups(Pipeline pipeline) {
+  return pipeline == Pipeline::paper || pipeline == Pipeline::catgs;
+}
 
 /// Whether a pipeline may show colours of an earlier frame.
 constexpr bool keeps_colours(Pipeline pipeline) {
@@ -73,8 +78,9 @@ struct FrameStats {
   std::uint32_t missing_pages = 0;
   float coarsest_px = 0.0f;  // the largest error that memory leaves; 0: none over the detail
   bool settled = true;       // a camera at rest would see no other picture in the next frame
-  // Pipeline::paper
-  int window = 0;  // key frames: sub-frames promised; sub-frames: that of their key frame
+  // Pipelines with groups
+  int window = 0;           // key frames: sub-frames promised; sub-frames: that of their key frame
+  bool cut_window = false;  // key frames: the window before it ended early
   float displacement_px = 0;  // key frames: longest trail deeper than speculation_min_depth()
   // Over visible Gaussians deeper than speculation_min_depth().
   float nearest_depth = 0;       // world units
@@ -86,7 +92,8 @@ struct FrameStats {
 struct FrameRequest {
   Camera camera;
   glm::vec3 background{0.0f};
-  std::optional<Forecast> forecast{};  // Pipeline::paper; without it no sub-frame follows
+  // Pipelines with groups; without it no sub-frame follows.
+  std::optional<Forecast> forecast{};
   // Scenes in pages: the largest error to be drawn, in pixels; 0 draws every Gaussian.
   float detail_px = 0.0f;
   // Scenes in pages: where the camera may be soon. Pages are read for it, too.
@@ -122,7 +129,7 @@ struct ViewSettings {
   MemorySpace space = MemorySpace::host;  // of rgb_f32; device: it stays on the device
   std::uint64_t max_list_entries = std::uint64_t{64} << 20;  // bounds the memory of tile lists
   bool count_pairs = false;           // fill FrameStats::blended_pairs; slower
-  SpeculationSettings speculation{};  // Pipeline::paper
+  SpeculationSettings speculation{};  // Pipeline::paper and catgs
   bool colour_cache = true;           // CPU core, catgs and paper: reuse colours while accurate
   bool split_tasks = true;            // CUDA core: long tiles are blended in several parts
 };

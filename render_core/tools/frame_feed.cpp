@@ -6,8 +6,7 @@ namespace catgs {
 
 FrameFeed::FrameFeed(const RenderSetup& setup, const ViewSettings& settings)
     : setup_(setup),
-      forecast_frames_(settings.pipeline == Pipeline::paper ? settings.speculation.initial_window
-                                                            : 0),
+      forecast_frames_(has_groups(settings.pipeline) ? settings.speculation.initial_window : 0),
       predictor_(setup.predictor) {}
 
 FrameRequest FrameFeed::next() {

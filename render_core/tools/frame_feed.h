@@ -13,7 +13,7 @@ namespace catgs {
 /// predictor.
 class FrameFeed {
  public:
-  /// Both belong to the caller. Only the paper's pipeline gets forecasts, over its initial window.
+  /// Both belong to the caller. Pipelines with groups get forecasts, over their initial window.
   FrameFeed(const RenderSetup& setup, const ViewSettings& settings);
 
   /// The request of frame 0, 1, … of the path.

@@ -24,7 +24,7 @@ void refuse_without_groups(const PipelineOptions& options) {
   const auto refuse = [&](bool given, std::string_view flag) {
     if (!given) return;
     throw InputError(flag, "", fmt::format("has no effect on the {} pipeline", options.pipeline),
-                     "use --pipeline paper");
+                     "use --pipeline paper or catgs");
   };
   refuse(options.window.has_value(), "--window");
   refuse(options.max_trail_px.has_value(), "--max-trail-px");
@@ -50,12 +50,13 @@ void add_pipeline_options(CLI::App& command, PipelineOptions& options) {
       ->capture_default_str();
   add_speculation_options(command, options);
   command
-      .add_flag("--no-cache", options.no_cache, "paper: every frame is a key frame (--window 0)")
+      .add_flag("--no-cache", options.no_cache,
+                "paper, catgs: every frame is a key frame (--window 0)")
       ->excludes(command.get_option("--window"));
   command.add_flag("--no-colour-cache", options.no_colour_cache,
                    "catgs, paper, CPU core: shade every Gaussian in view in every frame");
   command.add_flag("--constant-velocity", options.constant_velocity,
-                   "paper: do not damp forecasts, however wrong earlier ones were");
+                   "paper, catgs: do not damp forecasts, however wrong earlier ones were");
   command.add_flag("--no-split", options.no_split,
                    "CUDA core: do not split long tile lists into slices");
 }
@@ -65,27 +66,30 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
   command.add_option(
       "--window", options.window,
       fmt::format(
-          "paper: sub-frames after a key frame while motion is small, within 100 ms; 0: none ({})",
-          defaults.initial_window));
+          "paper, catgs: sub-frames after a key frame while motion is small, within 100 ms; "
+          "0: none (paper: {}, catgs: {} where that saves time)",
+          defaults.initial_window, following_speculation.initial_window));
   command.add_option("--max-trail-px", options.max_trail_px,
-                     fmt::format("paper: largest motion of a Gaussian in a window, px ({})",
+                     fmt::format("paper, catgs: largest motion of a Gaussian in a window, px ({})",
                                  defaults.max_trail_px));
   command.add_option(
       "--min-depth", options.min_depth,
-      "paper: depth below which Gaussians do not shorten the window (2 x near plane)");
+      "paper, catgs: depth below which Gaussians do not shorten the window (2 x near plane)");
   command.add_option(
       "--max-deviation-px", options.max_deviation_px,
-      fmt::format("paper: largest distance from the forecast, px; beyond it a key frame follows "
-                  "({})",
-                  defaults.max_deviation_px));
+      fmt::format("paper, catgs: largest distance from the forecast, px; beyond it a key frame "
+                  "follows ({}, {})",
+                  defaults.max_deviation_px, following_speculation.max_deviation_px));
 }
 
 ViewSettings view_settings(const PipelineOptions& options) {
   ViewSettings settings;
   settings.pipeline = parse_name("--pipeline", options.pipeline, pipelines);
-  if (settings.pipeline != Pipeline::paper) refuse_without_groups(options);
+  if (!has_groups(settings.pipeline)) refuse_without_groups(options);
   if (!keeps_colours(settings.pipeline)) refuse_without_colours(options);
   SpeculationSettings& speculation = settings.speculation;
+  if (settings.pipeline == Pipeline::catgs) speculation = following_speculation;
+  speculation.where_it_pays = !options.window;
   speculation.initial_window =
       options.no_cache ? 0 : options.window.value_or(speculation.initial_window);
   speculation.max_trail_px = options.max_trail_px.value_or(speculation.max_trail_px);

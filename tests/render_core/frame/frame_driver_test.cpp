@@ -1,6 +1,8 @@
 #include "render_core/frame/frame_driver.h"
 
+#include <algorithm>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -14,16 +16,22 @@ namespace {
 /// A core that draws nothing and notes what it is asked for.
 class Core {
  public:
-  explicit Core(const ViewSettings& settings) : driver_(settings) {}
+  explicit Core(const ViewSettings& settings,
+                FrameDriver::CatgsWindows windows = FrameDriver::CatgsWindows::none)
+      : driver_(settings, windows) {}
 
   RenderStatus render(const FrameRequest& request) {
     return driver_.render(
         request, frame,
-        [&](const FramePlan& plan) {
+        [&](const FramePlan& plan) -> std::optional<FrameView> {
           asked.push_back(plan);
           if (fails) fails();
+          if (refuses && plan.kind == FrameKind::sub) return std::nullopt;
           FrameView drawn;
           drawn.stats = stats;
+          drawn.stats.stage_ms[0] = plan.kind == FrameKind::sub ? sub_ms
+                                    : plan.window > 0           ? key_ms
+                                                                : plain_ms;
           return drawn;
         },
         [&] { ++forgotten; });
@@ -34,6 +42,8 @@ class Core {
   FrameView frame;
   FrameStats stats;
   std::function<void()> fails;
+  bool refuses = false;  // sub-frames
+  float plain_ms = 1.0f, key_ms = 1.1f, sub_ms = 0.6f;
 
  private:
   FrameDriver driver_;
@@ -49,7 +59,42 @@ FrameRequest resting() {
 
 constexpr ViewSettings paper{.pipeline = Pipeline::paper};
 
-TEST(FrameDriver, OnlyThePaperHasGroups) {
+/// Draws `frames` frames, and returns how many were sub-frames.
+int sub_frames_of(Core& core, int frames) {
+  core.asked.clear();
+  for (int i = 0; i < frames; ++i) EXPECT_TRUE(core.render(resting()).ok());
+  return static_cast<int>(std::ranges::count(core.asked, FrameKind::sub, &FramePlan::kind));
+}
+
+constexpr ViewSettings catgs{.pipeline = Pipeline::catgs, .speculation = following_speculation};
+
+TEST(FrameDriver, CatgsHasWindowsWhileTheySaveTime) {
+  Core core(catgs, FrameDriver::CatgsWindows::some);
+  EXPECT_GT(sub_frames_of(core, 90), 70);
+  core.sub_ms = 1.05f;
+  core.key_ms = 1.3f;
+  sub_frames_of(core, 300);
+  EXPECT_LT(sub_frames_of(core, 300), 30);
+  core.sub_ms = 0.6f;
+  core.key_ms = 1.1f;
+  sub_frames_of(core, 3000);
+  EXPECT_GT(sub_frames_of(core, 300), 200);
+}
+
+TEST(FrameDriver, ASubFrameWhoseListsDoNotHoldIsDrawnAsAKeyFrame) {
+  ViewSettings always = catgs;
+  always.speculation.where_it_pays = false;
+  Core core(always, FrameDriver::CatgsWindows::some);
+  core.refuses = true;
+  ASSERT_TRUE(core.render(resting()).ok());
+  ASSERT_TRUE(core.render(resting()).ok());
+  ASSERT_EQ(core.asked.size(), 3u);
+  EXPECT_EQ(core.asked[1].kind, FrameKind::sub);
+  EXPECT_EQ(core.asked[2].kind, FrameKind::key);
+  EXPECT_EQ(core.frame.stats.kind, FrameKind::key);
+}
+
+TEST(FrameDriver, CatgsHasNoWindowsWhereACoreHasNone) {
   for (const Pipeline pipeline : {Pipeline::exact, Pipeline::vanilla, Pipeline::catgs}) {
     Core core({.pipeline = pipeline});
     for (int i = 0; i < 3; ++i) ASSERT_TRUE(core.render(resting()).ok());

@@ -197,6 +197,7 @@ class BlendStage : public StageTest {
                   .finish = finish,
                   .reach = reach.get(),
                   .counts = on_device.get(),
+                  .loose = false,
                   .count_pairs = false,
                   .warps = blend_warps(processors())},
                  stream.get());
@@ -207,6 +208,7 @@ class BlendStage : public StageTest {
                       .consumed = consumed.get(),
                       .entries = entry.get(),
                       .ends = part_ends,
+                      .loose = false,
                       .finish = finish,
                       .background = behind,
                       .rgb = rgb.get(),
@@ -362,6 +364,7 @@ TEST_F(CompositeStage, FoldsSlicesFrontToBack) {
                     .consumed = consumed.get(),
                     .entries = nullptr,
                     .ends = {.splat_depth = nullptr, .depth = nullptr},
+                    .loose = false,
                     .finish = exact_finish,
                     .background = make_float3(background.x, background.y, background.z),
                     .rgb = rgb.get(),

@@ -39,7 +39,10 @@ class OcclusionStage : public StageTest {
     const Stream stream;
     launch_occlusion({.shape = shape_,
                       .now = camera(now),
-                      .last = camera(last),
+                      .end = camera(now),
+                      .sweeps = false,
+                      .shown = make_int4(0, 0, size_px.x, size_px.y),
+                      .last = {.camera = camera(last), .shape = shape_},
                       .radius = radius,
                       .last_ends = last_ends.get(),
                       .part = part.get(),

@@ -71,7 +71,8 @@ class SplitStage : public StageTest {
       last_reach.push_back(tile.reach);
     }
     const auto range = upload(ranges);
-    const auto reach = upload(last_reach);
+    const auto last = upload(last_reach);
+    const auto reach = upload(std::vector<std::uint32_t>(tiles_.size(), ~0u));
     const auto tasks = upload(std::vector<BlendTask>(task_bound(shape_)));
     const auto slices = upload(std::vector<uint2>(tiles_.size()));
     const auto queue = upload(std::vector<std::uint32_t>(queue_bound(shape_)));
@@ -79,18 +80,19 @@ class SplitStage : public StageTest {
         upload(std::vector<float>(std::size_t{slice_bound} * parts_per_tile + 1));
     const auto counts = upload(std::vector<FrameCounts>(1));
     const Stream stream;
-    launch_split({.shape = shape_,
-                  .range = range.get(),
-                  .reach_known = true,
-                  .reach = reach.get(),
-                  .tasks = tasks.get(),
-                  .tile_slices = slices.get(),
-                  .queue = queue.get(),
-                  .slice_transmittance = transmittance.get(),
-                  .counts = counts.get(),
-                  .mean_list = mean,
-                  .split = true},
-                 stream.get());
+    launch_split(
+        {.shape = shape_,
+         .range = range.get(),
+         .last_reach = {.reach = last.get(), .tiles_x = shape_.tiles_x, .tiles_y = shape_.tiles_y},
+         .reach = reach.get(),
+         .tasks = tasks.get(),
+         .tile_slices = slices.get(),
+         .queue = queue.get(),
+         .slice_transmittance = transmittance.get(),
+         .counts = counts.get(),
+         .mean_list = mean,
+         .split = true},
+        stream.get());
     return {fetch(counts.get(), 1)[0],          fetch(tasks.get(), task_bound(shape_)),
             fetch(slices.get(), tiles_.size()), fetch(queue.get(), queue_bound(shape_)),
             fetch(reach.get(), tiles_.size()),  fetch(transmittance.get(), transmittance.size())};

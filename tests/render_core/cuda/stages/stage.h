@@ -115,6 +115,8 @@ inline FrameShape picture_shape(glm::ivec2 size_px) {
   FrameShape shape;
   shape.width_px = size_px.x;
   shape.height_px = size_px.y;
+  shape.grid_width_px = size_px.x;
+  shape.grid_height_px = size_px.y;
   shape.tiles_x = (size_px.x + tile_side_px - 1) / tile_side_px;
   shape.tiles_y = (size_px.y + tile_side_px - 1) / tile_side_px;
   return shape;
@@ -155,8 +157,11 @@ class StagedLists {
     request_.scene = scene.device.arrays();
     shape_.visible_bound = std::max(scene.device.arrays().count, 1u);
     shape_.list_bound = 64 * shape_.visible_bound + 4096;
-    (void)memory_.reserve(
-        {.shape = shape_, .scene = scene.device.arrays(), .in_pages = false, .settings = settings});
+    (void)memory_.reserve({.shape = shape_,
+                           .scene = scene.device.arrays(),
+                           .in_pages = false,
+                           .settings = settings,
+                           .windows = true});
   }
 
   [[nodiscard]] const FrameShape& shape() const { return shape_; }
