@@ -139,6 +139,10 @@ class Metrics {
   prometheus::Counter& frames_rendered = counter("catgs_frames_rendered_total", "Frames rendered");
   prometheus::Counter& device_seconds =
       counter("catgs_device_seconds_total", "Time that GPUs took for the frames rendered");
+  prometheus::Counter& frames_speculated =
+      counter("catgs_frames_speculated_total", "Frames drawn from the lists of an earlier one");
+  prometheus::Counter& windows_cut = counter(
+      "catgs_windows_cut_total", "Windows of such frames that ended before their forecast did");
   prometheus::Counter& frames_refined = counter(
       "catgs_frames_refined_total", "Frames that sharpened a still picture, not rendered again");
   prometheus::Counter& frames_sent =

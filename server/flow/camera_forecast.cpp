@@ -1,5 +1,6 @@
 #include "server/flow/camera_forecast.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -45,6 +46,14 @@ bool CameraForecast::on_path(std::int64_t time_us) const {
 std::optional<Pose> CameraForecast::at(std::int64_t time_us) const {
   if (on_path(time_us)) return interpolate(path_, time_us);
   return predictor_.at(time_us);
+}
+
+std::optional<Forecast> CameraForecast::forecast(std::int64_t now_us, double rate_hz,
+                                                 int frames) const {
+  if (!on_path(now_us)) return predictor_.forecast(now_us, rate_hz, frames);
+  const double left_s = 1e-6 * static_cast<double>(path_.back().time_us - now_us);
+  const int held = std::min(frames, static_cast<int>(left_s * rate_hz));
+  return Forecast{interpolate(path_, now_us + std::llround(1e6 * held / rate_hz)), held};
 }
 
 }  // namespace catgs

@@ -21,6 +21,9 @@ class CameraForecast {
 
   /// See MotionPredictor.
   [[nodiscard]] std::optional<Pose> at(std::int64_t time_us) const;
+  /// See MotionPredictor. A path tells where the camera is until it ends.
+  [[nodiscard]] std::optional<Forecast> forecast(std::int64_t now_us, double rate_hz,
+                                                 int frames) const;
 
  private:
   [[nodiscard]] bool on_path(std::int64_t time_us) const;

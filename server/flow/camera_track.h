@@ -22,7 +22,8 @@ class CameraTrack {
     newest_ = sample;
     forecast_.add({sample.client_time_us, sample.world_from_camera});
     aim_ = sample;
-    if (const auto then = forecast_.at(sample.client_time_us + ahead.count()))
+    seen_us_ = sample.client_time_us + ahead.count();
+    if (const auto then = forecast_.at(seen_us_))
       aim_.world_from_camera = *then;
     return true;
   }
@@ -40,6 +41,10 @@ class CameraTrack {
   [[nodiscard]] std::optional<Pose> ahead(std::chrono::microseconds time) const {
     return newest_ ? forecast_.at(newest_->client_time_us + time.count()) : std::nullopt;
   }
+  /// The camera from aim() on, over so many frames.
+  [[nodiscard]] std::optional<Forecast> forecast(double rate_hz, int frames) const {
+    return forecast_.forecast(seen_us_, rate_hz, frames);
+  }
   /// Aims at the newest pose itself, because the camera stands still.
   void aim_at_newest() { aim_ = *newest_; }
 
@@ -47,6 +52,7 @@ class CameraTrack {
   CameraForecast forecast_;
   std::optional<PoseSample> newest_;
   PoseSample aim_;
+  std::int64_t seen_us_ = 0;  // when the picture of aim_ is
 };
 
 }  // namespace catgs

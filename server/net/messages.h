@@ -194,6 +194,9 @@ struct Stats {
   float detail_px = 0.0f;
   int finest_level = 0;
   int coarsest_level = 0;
+  float device_ms = 0.0f;  // mean of a frame
+  float frames_per_key = 0.0f;
+  std::uint32_t windows_cut = 0;
 };
 
 struct Heartbeat {

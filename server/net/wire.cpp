@@ -117,6 +117,9 @@ void fill(const Stats& stats, v1::ServerMessage& out) {
   message.set_detail_px(stats.detail_px);
   message.set_finest_level(static_cast<std::uint32_t>(stats.finest_level));
   message.set_coarsest_level(static_cast<std::uint32_t>(stats.coarsest_level));
+  message.set_device_ms(stats.device_ms);
+  message.set_frames_per_key(stats.frames_per_key);
+  message.set_windows_cut(stats.windows_cut);
 }
 
 void fill(const Heartbeat& heartbeat, v1::ServerMessage& out) {

@@ -15,7 +15,9 @@ StreamOpened open_now(Stream& stream, StreamSettings settings, const EncoderFact
   try {
     if (!stream.view || stream.settings.renderer != settings.renderer) {
       stream.view.reset();  // its memory first: two views of a large scene may not fit
-      stream.view = settings.renderer->make_view({Pipeline::catgs, PixelFormat::i420});
+      stream.view = settings.renderer->make_view({.pipeline = Pipeline::catgs,
+                                                  .format = PixelFormat::i420,
+                                                  .speculation = following_speculation});
     }
   } catch (const DeviceError& error) {
     opened.message = error.what();

@@ -126,6 +126,9 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   order.request.background = background_;
   order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();
   order.request.soon = track_.ahead(pages_ahead);
+  // A still is drawn once, and exactly where the camera is.
+  if (!ticket.still)
+    order.request.forecast = track_.forecast(order.real_fps, following_speculation.initial_window);
 }
 
 void FrameLoop::limit(FrameOrder& order, TimePoint now) {

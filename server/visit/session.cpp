@@ -314,7 +314,12 @@ void Session::account_for(const FrameResult& result, TimePoint now) {
   const double device_s = visit_.stream().device()
                               ? 1e-3 * std::accumulate(stage_ms.begin(), stage_ms.end(), 0.0)
                               : 0.0;
-  if (result.ok && !ticket.refined) metrics.device_seconds.Increment(device_s);
+  if (result.ok && !ticket.refined) {
+    metrics.device_seconds.Increment(device_s);
+    if (result.stats.kind == FrameKind::sub) metrics.frames_speculated.Increment();
+    if (result.stats.cut_window) metrics.windows_cut.Increment();
+    visit_.statistics().frame_drawn(result.stats, device_s);
+  }
   const glm::dvec2 size_px = ticket.size_px, moving_px = visit_.stream().plan().moving().size_px;
   usage_.frame_ended(ticket, device_s, now, size_px.x * size_px.y / (moving_px.x * moving_px.y));
 }

@@ -14,6 +14,13 @@ void VisitStatistics::frame_sent(std::size_t bytes) {
   second_bytes_ += bytes;
 }
 
+void VisitStatistics::frame_drawn(const FrameStats& frame, double device_s) {
+  ++second_drawn_;
+  if (frame.kind == FrameKind::key) ++second_keys_;
+  if (frame.cut_window) ++stats_.windows_cut;
+  second_device_s_ += device_s;
+}
+
 void VisitStatistics::pages_drawn(const FrameStats& frame, float detail_px) {
   stats_.gaussians_drawn = frame.visible;
   stats_.nodes_drawn = frame.nodes;
@@ -33,10 +40,15 @@ std::optional<Stats> VisitStatistics::take(const FlowControl& flow, int sessions
   if (now - second_start_ < 1s) return std::nullopt;
   const float seconds = std::chrono::duration<float>(now - second_start_).count();
   second_start_ = now;
+  const auto drawn = static_cast<float>(std::exchange(second_drawn_, 0));
+  const auto keys = static_cast<float>(std::exchange(second_keys_, 0));
+  const auto device_ms = static_cast<float>(1e3 * std::exchange(second_device_s_, 0.0));
   if (second_frames_ == 0) return std::nullopt;  // a still picture has the heartbeat instead
   Stats stats = std::exchange(stats_, {});
   stats.fps = static_cast<float>(std::exchange(second_frames_, 0)) / seconds;
   stats.bitrate_kbps = static_cast<float>(std::exchange(second_bytes_, 0)) * 8e-3f / seconds;
+  if (drawn > 0.0f) stats.device_ms = device_ms / drawn;
+  if (keys > 0.0f) stats.frames_per_key = drawn / keys;
   stats.sessions = static_cast<std::uint32_t>(sessions);
   stats.target_bitrate_kbps = flow.bitrate_kbps();
   stats.target_fps = static_cast<int>(1s / flow.frame_interval());

@@ -19,6 +19,8 @@ class VisitStatistics {
 
   /// A frame left through the socket. Only now does it count as sent.
   void frame_sent(std::size_t bytes);
+  /// A frame was drawn, not only refined. `device_s`: time of a GPU; 0 on the CPU core.
+  void frame_drawn(const FrameStats& frame, double device_s);
   /// A frame of a scene in pages was drawn.
   void pages_drawn(const FrameStats& frame, float detail_px);
   /// Frames were dropped before they reached the socket.
@@ -36,6 +38,8 @@ class VisitStatistics {
   TimePoint second_start_;
   std::uint32_t second_frames_ = 0;
   std::uint64_t second_bytes_ = 0;
+  std::uint32_t second_drawn_ = 0, second_keys_ = 0;  // frames, and key frames among them
+  double second_device_s_ = 0.0;
   Stats stats_;
 
   std::uint64_t frames_sent_ = 0;

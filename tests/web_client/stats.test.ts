@@ -1,4 +1,4 @@
-import { create } from '@bufbuild/protobuf';
+import { create, type MessageInitShape } from '@bufbuild/protobuf';
 import { describe, expect, it } from 'vitest';
 import { percentile, TimeWindow } from '#client/base/time_window';
 import type { Frame } from '#client/decode/picture';
@@ -6,7 +6,7 @@ import { StatsHistory } from '#client/stats/history';
 import { Metrics } from '#client/stats/metrics';
 import { PoseAge } from '#client/stats/pose_age';
 import { rest_note, row_texts, slowest_stage, stats_rows } from '#client/ui/stats_rows';
-import { FrameHeaderSchema } from '#client/wire/wire';
+import { FrameHeaderSchema, StatsSchema } from '#client/wire/wire';
 
 const ms = 1000;
 
@@ -225,6 +225,19 @@ describe('statistics panel', () => {
     const metrics = new Metrics();
     metrics.presented({ ...frame, header: { ...frame.header, still: true } }, 220 * ms);
     expect(rest_note(metrics.snapshot(230 * ms))).toMatch(/move it/i);
+  });
+
+  it('says what the GPU does, and how often it lists the Gaussians in view', () => {
+    const metrics = new Metrics();
+    const said = (stats: MessageInitShape<typeof StatsSchema>): string => {
+      metrics.server_said(create(StatsSchema, stats));
+      return texts(metrics)['GPU']!;
+    };
+    expect(said({ deviceMs: 0.514, framesPerKey: 3.25, windowsCut: 2 })).toBe(
+      '0.51 ms · 3.3 frames a list · 2 left early',
+    );
+    expect(said({ deviceMs: 0.6, framesPerKey: 1 })).toBe('0.60 ms');
+    expect(said({ deviceMs: 0 })).toBe('–');
   });
 
   it('shows one dash for what was not measured', () => {

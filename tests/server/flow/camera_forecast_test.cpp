@@ -49,6 +49,18 @@ TEST(CameraForecast, LeavesThePathWithTheCamera) {
   EXPECT_LT(forecast.at(250'000)->position.x, -1.0f);
 }
 
+TEST(CameraForecast, AnAnnouncedPathTellsEveryFrameUntilItsEnd) {
+  CameraForecast forecast(0.2f);
+  forecast.follow(accelerating());
+  forecast.add({0, at_x(0.0f)});
+  const auto half_a_second = forecast.forecast(300'000, 20.0, 10);
+  EXPECT_EQ(half_a_second->frames, 10);
+  EXPECT_NEAR(half_a_second->world_from_camera.position.x, 0.64f, 1e-3f);
+  const auto to_the_end = forecast.forecast(800'000, 20.0, 10);
+  EXPECT_EQ(to_the_end->frames, 4);
+  EXPECT_NEAR(to_the_end->world_from_camera.position.x, 1.0f, 1e-3f);
+}
+
 TEST(CameraForecast, EndsWithItsPath) {
   CameraForecast forecast(0.2f);
   forecast.follow(accelerating());

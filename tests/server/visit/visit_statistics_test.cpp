@@ -34,5 +34,23 @@ TEST(VisitStatisticsTest, AreToldOnceASecondWhileFramesFlow) {
   EXPECT_EQ(statistics.bytes_sent(), 300u);
 }
 
+TEST(VisitStatisticsTest, TellWhatTheGpuDrewAndFromWhichLists) {
+  TimePoint now = TimePoint{} + 1h;
+  const FlowControl flow;
+  VisitStatistics statistics(now);
+  FrameStats key, sub, cut;
+  sub.kind = FrameKind::sub;
+  cut.cut_window = true;
+  for (const FrameStats& frame : {key, sub, sub, sub, cut, sub}) {
+    statistics.frame_drawn(frame, 0.5e-3);
+    statistics.frame_sent(100);
+  }
+  const auto stats = statistics.take(flow, 1, now += 1s);
+  ASSERT_TRUE(stats);
+  EXPECT_FLOAT_EQ(stats->device_ms, 0.5f);
+  EXPECT_FLOAT_EQ(stats->frames_per_key, 3.0f);
+  EXPECT_EQ(stats->windows_cut, 1u);
+}
+
 }  // namespace
 }  // namespace catgs

@@ -36,6 +36,14 @@ export interface StatsSnapshot extends Motion {
   readonly packets_dropped: number; // never sent by the server
   /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
   readonly pages: PagesDrawn | undefined;
+  readonly gpu: GpuUse | undefined; // of the last second; undefined: the server's CPU draws
+}
+
+/** What the server's GPU does for this picture. */
+export interface GpuUse {
+  readonly frame_ms: number; // mean
+  readonly frames_per_list: number;
+  readonly lists_left: number; // before their forecast ended
 }
 
 /** What the last picture shows of a scene that is read in pages. */
@@ -69,6 +77,7 @@ export class Metrics {
   private size_px_: readonly [number, number] = [0, 0];
   private packets_dropped_ = 0;
   private pages_: PagesDrawn | undefined;
+  private gpu_: GpuUse | undefined;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -113,6 +122,14 @@ export class Metrics {
 
   server_said(stats: Stats): void {
     this.packets_dropped_ = stats.droppedPackets;
+    this.gpu_ =
+      stats.deviceMs > 0
+        ? {
+            frame_ms: stats.deviceMs,
+            frames_per_list: stats.framesPerKey,
+            lists_left: stats.windowsCut,
+          }
+        : undefined;
     const in_pages = stats.nodesDrawn > 0;
     this.pages_ = !in_pages
       ? undefined
@@ -139,6 +156,7 @@ export class Metrics {
       frames_dropped: this.frames_dropped_,
       packets_dropped: this.packets_dropped_,
       pages: this.pages_,
+      gpu: this.gpu_,
       last_motion: this.motion((window) => window.newest()),
     };
   }

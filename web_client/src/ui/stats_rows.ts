@@ -1,6 +1,7 @@
 // Texts of the statistics overlay. Pure.
 import {
   stages,
+  type GpuUse,
   type PagesDrawn,
   type Stage,
   type StatsReport,
@@ -42,6 +43,16 @@ function detail({
     number(gaussians, { notation: 'compact', maximumFractionDigits: 2 }),
     finest === coarsest ? words.level({ level: finest }) : words.levels({ finest, coarsest }),
     ...(missing_pages === 0 ? [] : [words.pages_missing({ count: missing_pages })]),
+  ].join(' · ');
+}
+
+function gpu({ frame_ms, frames_per_list, lists_left }: GpuUse): string {
+  return [
+    `${decimals(frame_ms, 2)} ${units.milliseconds}`,
+    ...(frames_per_list > 1
+      ? [words.frames_per_list({ count: decimals(frames_per_list, 1) })]
+      : []),
+    ...(lists_left > 0 ? [words.lists_left({ count: lists_left })] : []),
   ].join(' · ');
 }
 
@@ -90,6 +101,11 @@ export const stats_rows: readonly Row[] = [
     label: words.detail,
     title: words.detail_title,
     text: ({ pages }) => (pages === undefined ? nothing : detail(pages)),
+  },
+  {
+    label: words.gpu,
+    title: words.gpu_title,
+    text: (stats) => (stats.gpu === undefined ? nothing : gpu(stats.gpu)),
   },
   {
     label: words.drops,
