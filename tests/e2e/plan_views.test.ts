@@ -77,6 +77,11 @@ describe('plan and elevations', () => {
       expect(await button.getAttribute('aria-pressed')).toBe('true');
       await keep_screenshot(page, `views-${name.toLowerCase()}`);
     }
+    const [bar, panel, title] = await Promise.all(
+      ['#scale-bar', views, '#scene-title'].map((id) => page.locator(id).boundingBox()),
+    );
+    expect(bar!.x + bar!.width, 'beside the panel').toBeLessThan(panel!.x);
+    expect(bar!.y, 'under the title').toBeGreaterThan(title!.y + title!.height);
     const section = await linked_section(page);
     expect(section[6]).toBeCloseTo(20, 3);
     const psnr = psnr_db(await rendered(page, section), shown[4]!);
