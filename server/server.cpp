@@ -51,6 +51,10 @@ VisitOptions visit_options(const ServerConfig& config) {
   for (int i = 0; i < static_cast<int>(std::size(effort_presets)); ++i)
     if (effort_presets[static_cast<std::size_t>(i)].name == config.x264_preset)
       options.presets = {i, i};
+  options.presets.threads = config.encoder_threads;
+  options.policy.x264_aq = config.x264_aq;
+  options.policy.forecasts = config.forecasts;
+  options.policy.quality_ladder = config.quality_ladder;
   return options;
 }
 

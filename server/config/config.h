@@ -38,6 +38,10 @@ struct ServerConfig {
   std::string up = "auto";   // or the name of an axis
   EncoderKind encoder = EncoderKind::automatic;
   std::string x264_preset = "auto";  // or one of effort_presets
+  double x264_aq = default_aq_strength;
+  int encoder_threads = 0;  // 0: by sessions and processors
+  bool forecasts = true;
+  bool quality_ladder = true;
   int fps = 60;
   int bitrate_kbps = 8000;
   int max_sessions = 16;

@@ -125,6 +125,8 @@ Choices<std::string> words(std::initializer_list<const char*> list_of_words) {
   return choices;
 }
 
+Choices<bool> on_or_off() { return {{"on", true}, {"off", false}}; }
+
 Setting device() {
   return {"device", Setting::Kind::text, "all|N[,N...]",
           "CUDA devices that render, by CUDA's numbers; each holds a copy of the scenes",
@@ -249,6 +251,19 @@ std::vector<Setting> picture_settings() {
       choice<std::string>("x264-preset", "Preset of libx264; auto: by how busy the processors are",
                           &C::x264_preset,
                           words({"auto", "ultrafast", "ultrafast-subpel", "superfast"})),
+      number("x264-aq", "STRENGTH",
+             "Adaptive quantisation of libx264 from superfast on: more evens out flat parts, less "
+             "keeps edges; 0: none",
+             &C::x264_aq, 0.0, max_aq_strength),
+      number("encoder-threads", "N",
+             "Threads of each encoder; libx264 takes two at most. 0: by sessions and processors",
+             &C::encoder_threads, 0, max_encoder_threads),
+      choice<bool>("forecasts", "Draw what the camera is expected to see when the picture is shown",
+                   &C::forecasts, on_or_off()),
+      choice<bool>("quality-ladder",
+                   "Lower size and frame rate where a link or a decoder is slow; off: only the "
+                   "bitrate",
+                   &C::quality_ladder, on_or_off()),
       number("fps", "N", "Nominal frame rate of a session", &C::fps, 1, 240),
       number("bitrate", "KBPS", "Video bitrate of a session, kbit/s", &C::bitrate_kbps, 100,
              200'000),

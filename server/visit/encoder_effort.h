@@ -60,6 +60,7 @@ class EffortControl {
   struct Range {
     int lowest = 0;
     int highest = std::size(effort_presets) - 1;
+    int threads = 0;  // of each encoder; 0: by sessions and processors
   };
   /// A session that encodes in software.
   struct Session {

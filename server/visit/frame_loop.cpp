@@ -48,7 +48,7 @@ void FrameLoop::clip(const ClipBox& box, TimePoint now) {
 bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
   const auto before = track_.newest();
   // A picture drawn now is expected to be seen as long after its pose as recent pictures were.
-  if (!track_.add(sample, flow_.pose_to_photon())) {
+  if (!track_.add(sample, policy_.forecasts ? flow_.pose_to_photon() : 0us)) {
     if (sample.at_rest && sample.pose_id == before->pose_id) rest_.said(now);
     return false;
   }

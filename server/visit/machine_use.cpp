@@ -80,7 +80,7 @@ void MachineUse::control_effort(const SessionList& sessions, int admitted, TimeP
     const SessionUsage& usage = session->usage();
     const EncoderEffort effort = stream.plan().effort();
     const std::chrono::duration<double> interval = visit.frame_interval();
-    encoding.push_back({effort, usage.encoder_load() * effort.threads,
+    encoding.push_back({effort, usage.encoder_load() * std::min(effort.threads, max_h264_slices),
                         usage.encode_seconds() / interval.count(), stream.plan().moving().size_px});
     encoders.push_back(session);
   }

@@ -22,7 +22,7 @@ FlowRequest request_within(const VisitPolicy& policy, const Settings& settings,
       settings.max_bitrate_kbps > 0 ? settings.max_bitrate_kbps : policy.default_bitrate_kbps;
   const glm::ivec2 requested_px = settings.size_px.x > 0 ? settings.size_px : viewport_px;
   return {frame_size(requested_px, policy.max_pixels), std::min(fps, policy.max_fps),
-          std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality};
+          std::min(kbps, policy.max_bitrate_kbps), settings.fixed_quality, policy.quality_ladder};
 }
 
 glm::ivec2 still_size_within(const VisitPolicy& policy, const Settings& settings,
@@ -90,6 +90,7 @@ void PicturePlan::update() {
   moving_.size_px = scaled_size(request.size_px, flow_.ladder().rung().scale);
   moving_.fps = request.fps;
   moving_.bitrate_kbps = request.bitrate_kbps;
+  moving_.aq_strength = policy_.x264_aq;
   apply(effort_, moving_);
   still_size_px_ = still_size_within(policy_, settings_, viewport_px_);
 }

@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "server/encode/encoder.h"
+
 namespace catgs {
 
 /// Ticks come every 250 ms, and a client hears something at least once a second.
@@ -20,8 +22,11 @@ struct VisitPolicy {
   int max_fps = 120;
   int default_bitrate_kbps = 8000;
   int max_bitrate_kbps = 100'000;
-  int max_pixels = 3840 * 2160;                // larger requests are scaled down
-  float detail_px = 0.5f;                      // of trees: the finest, see DetailLadder
+  int max_pixels = 3840 * 2160;  // larger requests are scaled down
+  float detail_px = 0.5f;        // of trees: the finest, see DetailLadder
+  bool forecasts = true;         // pictures of where the camera will be when they are seen
+  bool quality_ladder = true;    // false: for slow links and decoders only the bitrate falls
+  double x264_aq = default_aq_strength;
   std::chrono::milliseconds still_after{100};  // without another view, at least: see Rest
   int refine_frames = 60;  // that sharpen a still picture at most, where the link is slow
   /// Between encoders that a client's settings ask for; the newest ones count.

@@ -1,5 +1,4 @@
 // Plan, elevations and the section box, against the real server.
-import { writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, describe, expect, it } from 'vitest';
@@ -9,37 +8,21 @@ import { choose_full_size, keep_screenshot, open, windows } from './support/brow
 import { distance, pose_of, settle } from './support/camera';
 import { psnr_db, read_png, settled_picture, type Picture } from './support/pictures';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
-import { crop_streets, scratch_folder, write_tum } from './support/scenes';
+import { make_streets, scratch_folder, write_tum } from './support/scenes';
 
 const folder = scratch_folder();
-const scene = path.join(folder, 'city.ply');
 const views = '#views-panel';
 const at_stop = [4, -3, 6, 16, 14, 9, 30];
 
+let scene: string;
 let server: RunningServer;
 
 beforeAll(async () => {
-  const city = path.join(scratch_folder(), 'whole.ply');
-  catgs_render('synth', 'city', city, '--gaussians', '300000');
-  crop_streets(city, scene, 0, 3);
-  const stop = { title: 'The corner', position: [4, -4, -30], orientation: [0, 0, 0, 1] };
-  writeFileSync(
-    path.join(folder, 'city.json'),
-    JSON.stringify({
-      up: [0, -1, 0],
-      metres_per_unit: 1,
-      start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] },
-      tours: [
-        {
-          title: 'Survey',
-          stops: [
-            { ...stop, view_height: 18, section: at_stop },
-            { title: 'The street', position: [0, -1.6, -8], look_at: [0, -1.6, 60] },
-          ],
-        },
-      ],
-    }),
-  );
+  const corner = { title: 'The corner', position: [4, -4, -30], orientation: [0, 0, 0, 1] };
+  scene = make_streets(folder, 'Survey', [
+    { ...corner, view_height: 18, section: at_stop },
+    { title: 'The street', position: [0, -1.6, -8], look_at: [0, -1.6, 60] },
+  ]);
   server = await start_server(scene, ['--min-fps', '0']);
 });
 
@@ -94,6 +77,11 @@ describe('plan and elevations', () => {
       expect(await button.getAttribute('aria-pressed')).toBe('true');
       await keep_screenshot(page, `views-${name.toLowerCase()}`);
     }
+    const [bar, panel, title] = await Promise.all(
+      ['#scale-bar', views, '#scene-title'].map((id) => page.locator(id).boundingBox()),
+    );
+    expect(bar!.x + bar!.width, 'beside the panel').toBeLessThan(panel!.x);
+    expect(bar!.y, 'under the title').toBeGreaterThan(title!.y + title!.height);
     const section = await linked_section(page);
     expect(section[6]).toBeCloseTo(20, 3);
     const psnr = psnr_db(await rendered(page, section), shown[4]!);

@@ -91,7 +91,7 @@ describe('a visit', () => {
   });
 
   it('reports how the demo city moves at 640x360', async () => {
-    const demo = await start_server('synth:city:300000');
+    const demo = await start_server('synth:city:300000', ['--fps', '60']);
     const { page } = await open(demo.url);
     await choose_full_size(page);
     await page.keyboard.down('ArrowRight');

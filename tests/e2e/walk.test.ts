@@ -10,34 +10,19 @@ import { barriers } from './support/axe';
 import { keep_screenshot, open, windows } from './support/browser';
 import { distance, pose_of, settle } from './support/camera';
 import { catgs_render, start_server, type RunningServer } from './support/programs';
-import { crop_streets, scratch_folder, write_room } from './support/scenes';
+import { make_streets, scratch_folder, write_room } from './support/scenes';
 
 const folder = scratch_folder();
-const scene = path.join(folder, 'city.ply');
 const eye_m = 1.6; // y points down, and the ground lies at 0
 const street: Vec3 = [0, -eye_m, -8];
 
+let scene: string;
 let server: RunningServer;
 
 beforeAll(async () => {
-  const city = path.join(scratch_folder(), 'whole.ply');
-  catgs_render('synth', 'city', city, '--gaussians', '300000');
-  crop_streets(city, scene, 0, 3);
   const stop = (title: string, position: Vec3) => ({ title, position, look_at: [0, -1.6, 60] });
-  writeFileSync(
-    path.join(folder, 'city.json'),
-    JSON.stringify({
-      up: [0, -1, 0],
-      metres_per_unit: 1,
-      start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] },
-      tours: [
-        {
-          title: 'The streets',
-          stops: [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])],
-        },
-      ],
-    }),
-  );
+  const stops = [stop('The crossing', street), stop('Up the street', [0, -eye_m, 4])];
+  scene = make_streets(folder, 'The streets', stops);
   catgs_render('floors', scene, path.join(folder, 'city.walk'), '--eye-height', String(eye_m));
   server = await start_server(scene, ['--min-fps', '0']);
 });

@@ -217,7 +217,7 @@ void add_displays(const RunReport& report, const HoldBounds& bounds, Json& parts
             [](const JudgedRefresh& refresh) { return refresh.ssim; });
   over_time({{"title", "PSNR over time"}, {"unit", "dB"}, {"floor", 15.0}},
             [](const JudgedRefresh& refresh) { return refresh.psnr_db; });
-  over_time({{"title", "pose age over time"}, {"unit", "ms"}},
+  over_time({{"title", "Pose age over time"}, {"unit", "ms"}},
             [](const JudgedRefresh& refresh) { return refresh.age_ms; });
   add_display_plots(
       report, {{"title", "SSIM of refreshes"}, {"unit", "% up to x"}},

@@ -31,6 +31,22 @@ export function crop_streets(city: string, file: string, x: number, z: number): 
   catgs_render('convert', city, file, `--crop=${box.join()}`);
 }
 
+/** Makes streets of the demo city with one tour, with y down and the ground at 0. Returns their file. */
+export function make_streets(folder: string, title: string, stops: readonly object[]): string {
+  const city = path.join(scratch_folder(), 'whole.ply');
+  const streets = path.join(folder, 'city.ply');
+  catgs_render('synth', 'city', city, '--gaussians', '300000');
+  crop_streets(city, streets, 0, 3);
+  const sidecar = {
+    up: [0, -1, 0],
+    metres_per_unit: 1,
+    start_pose: { position: [0, -9, -12], look_at: [0, -1, 20] },
+    tours: [{ title, stops }],
+  };
+  writeFileSync(path.join(folder, 'city.json'), JSON.stringify(sidecar));
+  return streets;
+}
+
 export interface Sidecar {
   readonly focus: Vec3;
   readonly start_pose: Pose;

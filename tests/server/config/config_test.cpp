@@ -69,6 +69,8 @@ TEST_F(ConfigTest, LaterLayersWin) {
 TEST_F(ConfigTest, PrintedConfigReadsBackTheSame) {
   read_flag("scene", {"with \"quotes\".ply", "back\\slash.ply"});
   read_flag("encoder", {"jpeg"});
+  read_flag("quality-ladder", {"off"});
+  read_flag("x264-aq", {"1.25"});
   const std::string printed = print_config(config, sources);
   ServerConfig again;
   ConfigSources ignored;
@@ -76,6 +78,9 @@ TEST_F(ConfigTest, PrintedConfigReadsBackTheSame) {
   apply_toml(path, again, ignored);
   EXPECT_EQ(again.scenes, config.scenes);
   EXPECT_EQ(again.encoder, EncoderKind::jpeg);
+  EXPECT_TRUE(again.forecasts);
+  EXPECT_FALSE(again.quality_ladder);
+  EXPECT_EQ(again.x264_aq, 1.25);
   EXPECT_EQ(again.admin_bind, config.admin_bind);
 }
 
@@ -86,6 +91,7 @@ TEST_F(ConfigTest, MistakesNameTheirPlace) {
   EXPECT_EQ(mistake_in("port = 1.5\n"), path + ":1: port");
   EXPECT_EQ(test::refused_field([&] { read_environment({{"CATGS_FPS", "0"}}); }), "CATGS_FPS");
   EXPECT_EQ(mistake_of("encoder", {"vp9"}), "--encoder");
+  EXPECT_EQ(mistake_of("forecasts", {"true"}), "--forecasts");
   EXPECT_EQ(mistake_of("admin-bind", {"9090"}), "--admin-bind");
   EXPECT_EQ(test::refused_field([&] { apply_toml("/nowhere.toml", config, sources); }),
             "--config /nowhere.toml");

@@ -2,6 +2,8 @@
 // demo city on the path of a head, and then at rest. Slices that wait for each other differ from
 // run to run, so nothing here compares bytes.
 
+#include <fmt/format.h>
+
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/cpu_renderer.h"
 #include "render_core/motion/script.h"
@@ -114,6 +116,12 @@ class X264Rate : public testing::Test {
     slow_coders.clear();
   }
 
+  /// In the test's report, such as --gtest_output=json.
+  static void record(const std::string& what, const Coder& coder, double value) {
+    RecordProperty(fmt::format("{}_with_{}_threads", what, coder.threads()),
+                   fmt::format("{:.2f}", value));
+  }
+
   static inline std::vector<std::unique_ptr<Coder>> coders, slow_coders;
 };
 
@@ -122,6 +130,8 @@ TEST_F(X264Rate, IsUsedWithAnyNumberOfThreads) {
     EXPECT_GE(coder->mean_use, 0.87) << coder->threads() << " threads: 0.85 without RateMargins";
     EXPECT_LE(coder->most_use, 1.2) << coder->threads() << " threads";
     EXPECT_GE(coder->median_db(), coders[0]->median_db() - 0.5) << coder->threads() << " threads";
+    record("use", *coder, coder->mean_use);
+    record("median_db", *coder, coder->median_db());
   }
 }
 
@@ -138,7 +148,8 @@ TEST_F(X264Rate, StillsEndSharpAndAlikeWithAnyNumberOfThreads) {
     EXPECT_TRUE(coder->sharp()) << coder->threads() << " threads";
     EXPECT_GE(coder->rest_db, 47.0) << coder->threads() << " threads";
     EXPECT_NEAR(coder->rest_db, coders[0]->rest_db, 0.3) << coder->threads() << " threads";
-    RecordProperty("refinements_" + std::to_string(coder->threads()), coder->refinements);
+    record("rest_db", *coder, coder->rest_db);
+    record("refinements", *coder, coder->refinements);
   }
 }
 

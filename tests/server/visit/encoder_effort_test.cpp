@@ -164,6 +164,16 @@ TEST(EffortControl, AFixedPresetStays) {
     EXPECT_TRUE(control.update(0.1, 1, std::span(&session, 1), now).empty());
 }
 
+TEST(EffortControl, FixedThreadsStay) {
+  EffortControl control(8, {.threads = 1});
+  EXPECT_EQ(control.initial(1, full_hd).threads, 1);
+  EffortControl::Session session{{superfast, 1}, 0.1, 0.05, full_hd};
+  TimePoint now = TimePoint{} + 1h;
+  for (int i = 0; i < 400; ++i, now += 250ms)
+    EXPECT_TRUE(control.update(0.1, 1, std::span(&session, 1), now).empty());
+  EXPECT_EQ(EffortControl(2, {.threads = 4}).initial(9, {640, 360}).threads, 4);
+}
+
 TEST_F(EffortControlTest, ManyWhoComeTogetherBeginWithWhatTheyUsuallyCost) {
   EXPECT_EQ(control.initial(1, full_hd).preset, superfast);
   EXPECT_EQ(control.initial(2, full_hd).preset, superfast);

@@ -261,6 +261,11 @@ TEST_F(AimTest, RendersWhereTheCameraWillBeWhenThePictureIsSeen) {
   EXPECT_NEAR(steps_ahead(walk(120, 1s)), 6.0f, 0.4f) << "100 ms at most";
 }
 
+TEST_F(AimTest, RendersThePoseItselfWithoutForecasts) {
+  policy.forecasts = false;
+  EXPECT_NEAR(steps_ahead(walk(60, 50ms)), 0.0f, 0.01f);
+}
+
 TEST_F(AimTest, APictureThatStaysIsOfThePoseItself) {
   const FrameOrder moving = walk(60, 50ms);
   ASSERT_GT(steps_ahead(moving), 1.0f);

@@ -97,6 +97,27 @@ TEST_F(PicturePlanTest, StillsThatFailedAreAsInMotionUntilTheClientWishesAnew) {
   EXPECT_EQ(plan.still().size_px, glm::ivec2(1920, 1080));
 }
 
+TEST_F(PicturePlanTest, KeepsItsSizeWithoutALadder) {
+  for (const bool ladder : {true, false}) {
+    policy.quality_ladder = ladder;
+    FlowControl slow;
+    PicturePlan own{policy, slow};
+    own.begin(hello, {}, 1.0);
+    Settings settings;
+    settings.max_bitrate_kbps = 100;  // 0.007 bits a pixel
+    own.request(settings, now);
+    for (int i = 0; i < 20; ++i) own.on_tick(now += 250ms);
+    EXPECT_EQ(own.moving().size_px.x < 640, ladder);
+  }
+}
+
+TEST_F(PicturePlanTest, AdaptiveQuantisationIsThePolicys) {
+  policy.x264_aq = 1.5;
+  plan.begin(hello, {}, 1.0);
+  EXPECT_EQ(plan.moving().aq_strength, 1.5);
+  EXPECT_EQ(plan.still().aq_strength, 1.5);
+}
+
 TEST_F(PicturePlanTest, StillsOfTheirOwnSizeAreMadeWithGoodEffortInOneSlice) {
   plan.use_effort({.preset = 0, .threads = 4});
   EXPECT_EQ(plan.moving().x264_preset, "ultrafast");
