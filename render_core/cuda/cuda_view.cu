@@ -325,6 +325,12 @@ void CudaView::blend(const FrameRequest& request) {
                     .rgb = m.rgb.get(),
                     .reach = m.reach.get()},
                    stream);
+  depths_.find({.shape = shape_,
+                .range = m.range.get(),
+                .entries = m.entries.get(),
+                .records = m.records.get(),
+                .splat_depth = m.splat_depth.get()},
+               settings_.pipeline == Pipeline::catgs ? request.depth_cells : glm::ivec2(0), stream);
   times_.end(Stage::blend, stream_.get());
 }
 
@@ -363,7 +369,9 @@ void CudaView::deliver() {
   }
 }
 
-std::size_t CudaView::memory_bytes() const { return memory_.bytes() + vanilla_.bytes(); }
+std::size_t CudaView::memory_bytes() const {
+  return memory_.bytes() + vanilla_.bytes() + depths_.bytes();
+}
 
 std::vector<std::uint32_t> CudaView::tile_loads() const {
   const bool vanilla = settings_.pipeline == Pipeline::vanilla;
@@ -391,6 +399,7 @@ FrameView CudaView::finished(FrameKind kind, float near_z) {
                          : reinterpret_cast<std::byte*>(memory_.rgb.get());
     frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
   }
+  frame.depths = depths_.grid();
   frame.stats = frame_stats(*memory_.host_counts.get(), shape_, kind, near_z);
   if (paged_) paged_->end(frame.stats);
   mean_inverse_depth_ = frame.stats.mean_inverse_depth;
