@@ -101,11 +101,15 @@ HWY_INLINE void find_hits(const Batch& batch, Vec2<float> offset, Hits& hits) {
   hits.splats = cull ? hits.splats & all : all;
 }
 
+/// What a blend notes beside the colours.
+enum class Notes { nothing, depths, depths_and_pairs };
+
 /// A block's pixels in registers, for as long as a batch is blended.
-template <bool fills>
+template <bool fills, bool depths>
 struct BlockRun {
   static constexpr int registers = block_px / lanes;
   std::conditional_t<fills, PixelState<Floats>, RunningPixel<Floats>> pixel[registers];
+  Floats half_depth[depths ? registers : 1];
 
   HWY_INLINE explicit BlockRun(const BlockPixels& pixels) {
     for (int k = 0; k < registers; ++k) {
@@ -114,6 +118,17 @@ struct BlockRun {
       } else {
         pixel[k] = begin_run(pixels.load(k * lanes));
       }
+      if constexpr (depths) half_depth[k] = Floats::load(pixels.half_depth + k * lanes);
+    }
+  }
+  /// Light comes to a splat at this depth. Where more than half of it is left, the splat may be the
+  /// one that stops half.
+  HWY_INLINE void reach(int k, const Floats& depth) {
+    const Floats half(0.5);
+    if constexpr (fills) {
+      half_depth[k] = select(pixel[k].transmittance >= half, depth, half_depth[k]);
+    } else {
+      half_depth[k] = select(pixel[k].running >= half, depth, half_depth[k]);
     }
   }
   /// Returns which pixels of a register are not finished.
@@ -131,16 +146,18 @@ struct BlockRun {
       } else {
         pixels.store(k * lanes, end_run(pixel[k]));
       }
+      if constexpr (depths) half_depth[k].store(pixels.half_depth + k * lanes);
     }
   }
 };
 
 /// Blends the hits over a block until all its pixels are finished. Returns the splat that finished
 /// them, or null. Adds the pairs to `pairs` if they are counted.
-template <bool fills, bool count_pairs>
+template <bool fills, Notes notes>
 HWY_INLINE const Splat* blend_hits(const Batch& batch, const Hits& hits, BlockPixels& pixels,
                                    std::uint64_t& pairs) {
-  BlockRun<fills> run(pixels);
+  constexpr bool depths = notes != Notes::nothing;
+  BlockRun<fills, depths> run(pixels);
   const Splat* last = nullptr;
   for (std::uint64_t left = hits.splats; left != 0 && last == nullptr; left &= left - 1) {
     const int i = std::countr_zero(left);
@@ -154,9 +171,11 @@ HWY_INLINE const Splat* blend_hits(const Batch& batch, const Hits& hits, BlockPi
       const Floats y = Floats::load(rows_in_block + k * lanes);
       const Floats u = mul_add(xx, x, mul_add(xy, y, start_u)), v = mul_add(yy, y, start_v);
       const Floats exponent = neg_mul_add(u, u, neg_mul_add(v, v, log2_opacity));
+      if constexpr (depths) run.reach(k, Floats(s.depth));
       const FloatMask live = run.add(k, exponent, colour);
       finished &= none(live);
-      if constexpr (count_pairs) pairs += std::popcount(bits(live & contributes(exponent)));
+      if constexpr (notes == Notes::depths_and_pairs)
+        pairs += std::popcount(bits(live & contributes(exponent)));
     }
     if (finished) last = &s;
   }
@@ -178,7 +197,7 @@ struct TilePixels {
 };
 
 /// Blends the list over the blocks inside the image. Returns the pairs if they are counted.
-template <bool cull, bool fills, bool count_pairs>
+template <bool cull, bool fills, Notes notes>
 std::uint64_t blend_list(const BlendTask& task, TilePixels& pixels) {
   const Vec2<float> first{static_cast<float>(task.first_px.x) + 0.5f,
                           static_cast<float>(task.first_px.y) + 0.5f};
@@ -192,7 +211,7 @@ std::uint64_t blend_list(const BlendTask& task, TilePixels& pixels) {
       const int block = std::countr_zero(left);
       const glm::ivec2 corner = block_corner_px(block);
       find_hits<cull>(batch, {static_cast<float>(corner.x), static_cast<float>(corner.y)}, hits);
-      const Splat* last = blend_hits<fills, count_pairs>(batch, hits, pixels.blocks[block], pairs);
+      const Splat* last = blend_hits<fills, notes>(batch, hits, pixels.blocks[block], pairs);
       if (last == nullptr) continue;
       pixels.ends[block] = last->depth;
       live_blocks &= ~(1u << block);
@@ -208,6 +227,21 @@ inline void note_ends(const TilePixels& pixels, const PartEnds& ends) {
   }
 }
 
+inline void note_depths(const TilePixels& pixels, const PartEnds& depths) {
+  for (std::uint32_t left = pixels.inside; left != 0; left &= left - 1) {
+    const int b = std::countr_zero(left);
+    depths.first[b / parts_across * depths.stride + b % parts_across] =
+        shown_inverse_depth(pixels.blocks[b]);
+  }
+}
+
+template <bool cull, bool fills>
+std::uint64_t blend_list(const BlendTask& task, TilePixels& pixels) {
+  if (task.count_pairs) return blend_list<cull, fills, Notes::depths_and_pairs>(task, pixels);
+  return task.depths.first != nullptr ? blend_list<cull, fills, Notes::depths>(task, pixels)
+                                      : blend_list<cull, fills, Notes::nothing>(task, pixels);
+}
+
 inline std::uint64_t blend_tile(const BlendTask& task) {
   TilePixels pixels;
   const glm::ivec2 size_px = task.image->size_px();
@@ -221,15 +255,13 @@ inline std::uint64_t blend_tile(const BlendTask& task) {
   }
   std::uint64_t pairs = 0;
   if (task.fills) {
-    pairs = task.count_pairs ? blend_list<true, true, true>(task, pixels)
-                             : blend_list<true, true, false>(task, pixels);
+    pairs = blend_list<true, true>(task, pixels);
   } else if (task.cull_blocks) {
-    pairs = task.count_pairs ? blend_list<true, false, true>(task, pixels)
-                             : blend_list<true, false, false>(task, pixels);
+    pairs = blend_list<true, false>(task, pixels);
   } else {
-    pairs = task.count_pairs ? blend_list<false, false, true>(task, pixels)
-                             : blend_list<false, false, false>(task, pixels);
+    pairs = blend_list<false, false>(task, pixels);
   }
+  if (task.depths.first != nullptr) note_depths(pixels, task.depths);
   for (std::uint32_t left = pixels.inside; left != 0; left &= left - 1) {
     const int b = std::countr_zero(left);
     const glm::ivec2 first = task.first_px + block_corner_px(b);

@@ -66,13 +66,15 @@ FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
     draw_cached_lists(camera, stats);
   }
   clock.restart();
+  depths_.begin(camera.size_px, request.depth_cells);
   stats.blended_pairs = blend(request);
+  const DepthGrid depths = depths_.finish(*scene_->pool);
   clock.end(Stage::blend);
   if (occludes) occlusion_.finish();
   summarise(stats);
   if (paged_) paged_->end(stats);
   mean_inverse_depth_ = stats.mean_inverse_depth;
-  return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats};
+  return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats, depths};
 }
 
 void CpuView::summarise(FrameStats& stats) const {
@@ -262,7 +264,8 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
                                     .fills = fills,
                                     .count_pairs = settings_.count_pairs,
                                     .image = &image_,
-                                    .ends = fills ? occlusion_.ends_of_tile(tile) : PartEnds{}});
+                                    .ends = fills ? occlusion_.ends_of_tile(tile) : PartEnds{},
+                                    .depths = depths_.of_tile(tile)});
     if (settings_.count_pairs) pairs += blended;
   });
   return pairs;
@@ -278,8 +281,9 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         occlusion_.memory_bytes() + bytes(clusters_) + bytes(shares_) + bytes(nodes_) +
-         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
+         occlusion_.memory_bytes() + depths_.memory_bytes() + bytes(clusters_) + bytes(shares_) +
+         bytes(nodes_) + bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) +
+         bytes(paths_);
 }
 
 }  // namespace catgs

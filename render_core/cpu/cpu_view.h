@@ -7,6 +7,7 @@
 
 #include "render_core/base/thread_pool.h"
 #include "render_core/cpu/colour_cache.h"
+#include "render_core/cpu/depth_sampler.h"
 #include "render_core/cpu/kernels.h"
 #include "render_core/cpu/occlusion.h"
 #include "render_core/cpu/page_slots.h"
@@ -74,7 +75,8 @@ class CpuView final : public View {
   std::vector<SplatPath> paths_;           // [slot]
   std::optional<ColourCache> colours_;
   TileLists lists_;
-  Occlusion occlusion_;              // Pipeline::catgs
+  Occlusion occlusion_;  // Pipeline::catgs
+  DepthSampler depths_;
   float mean_inverse_depth_ = 0.0f;  // of the last frame
   std::optional<PagedFrame> paged_;
 };

@@ -33,7 +33,8 @@ struct DepthLimits {
   [[nodiscard]] float of_tile(int x, int y) const { return at(tile_level, x, y); }
 };
 
-/// Where the parts of one tile end: view depths, parts_across in a row, rows `stride` apart.
+/// A number for each part of one tile, parts_across in a row, rows `stride` apart: the view depth
+/// where the part ends, or the inverse depth that it shows.
 struct PartEnds {
   float* first = nullptr;  // null: not wanted
   int stride = 0;

@@ -133,7 +133,8 @@ struct BlendTask {
   bool fills;
   bool count_pairs;
   const HostImage* image;
-  PartEnds ends;  // of the tile, to be noted where it fills
+  PartEnds ends;    // of the tile, to be noted where it fills
+  PartEnds depths;  // of the tile, to be noted: inverse, see DepthGrid
 };
 
 /// Finds the limits of a row of parts: math::occlusion_limit().

@@ -5,6 +5,8 @@
 #define CATGS_CPU_PIXELS_INL_H
 #endif
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "render_core/cpu/kernels.h"
@@ -31,6 +33,7 @@ alignas(64) inline constexpr float rows_in_block[block_px] = {0, 0, 0, 0, 1, 1, 
 struct alignas(64) BlockPixels {
   float red[block_px], green[block_px], blue[block_px];
   float transmittance[block_px];  // as in PixelState
+  float half_depth[block_px];     // of the splat that stops half of the light; only where wanted
 
   HWY_INLINE PixelState<Floats> load(int at) const {
     return {{Floats::load(red + at), Floats::load(green + at), Floats::load(blue + at)},
@@ -53,7 +56,23 @@ inline void clear(BlockPixels& pixels, glm::ivec2 inside_px) {
         (Floats::load(columns_in_block + at) < width) & (Floats::load(rows_in_block + at) < height);
     pixel.transmittance = select(inside, pixel.transmittance, Floats(0.0));
     pixels.store(at, pixel);
+    Floats(INFINITY).store(pixels.half_depth + at);
   }
+}
+
+/// The inverse depth that a block shows: of its 2x2 middle pixels, the second of the nearest. 0 for
+/// a pixel that lets half of the light pass.
+inline float shown_inverse_depth(const BlockPixels& pixels) {
+  constexpr int first = (block_side_px / 2 - 1) * (block_side_px + 1);
+  const auto inverse_depth = [&](int at) {
+    const bool stops = std::abs(pixels.transmittance[at]) < 0.5f;
+    return stops ? 1.0f / pixels.half_depth[at] : 0.0f;
+  };
+  const float a = inverse_depth(first), b = inverse_depth(first + 1);
+  const float c = inverse_depth(first + block_side_px);
+  const float d = inverse_depth(first + block_side_px + 1);
+  const float low = std::max(std::min(a, b), std::min(c, d));
+  return std::max(low, std::min(std::max(a, b), std::max(c, d)));
 }
 
 /// Resolves a block over the background in place.

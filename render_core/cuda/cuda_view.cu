@@ -272,8 +272,7 @@ void CudaView::project_group(const Camera& camera) {
   check(cudaEventRecord(projected_.get(), stream), "strays");
 }
 
-/// Whether no more splats than a picture can miss have left their lists. Meanwhile, the lists are
-/// repaired.
+/// Whether few enough splats have left their lists. Repairs the lists meanwhile.
 bool CudaView::lists_hold() {
   const ViewMemory& m = memory_;
   launch_list_repair({.shape = shape_,
@@ -381,6 +380,12 @@ void CudaView::blend(const FrameRequest& request) {
                     .rgb = m.rgb.get(),
                     .reach = m.reach.get()},
                    stream);
+  depths_.find({.shape = shape_,
+                .range = m.range.get(),
+                .entries = m.entries.get(),
+                .records = m.records.get(),
+                .splat_depth = m.splat_depth.get()},
+               settings_.pipeline == Pipeline::catgs ? request.depth_cells : glm::ivec2(0), stream);
   times_.end(Stage::blend, stream_.get());
 }
 
@@ -419,34 +424,21 @@ void CudaView::deliver() {
   }
 }
 
-std::size_t CudaView::memory_bytes() const { return memory_.bytes() + vanilla_.bytes(); }
+std::size_t CudaView::memory_bytes() const {
+  return memory_.bytes() + vanilla_.bytes() + depths_.bytes();
+}
 
 std::vector<std::uint32_t> CudaView::tile_loads() const {
-  const bool vanilla = settings_.pipeline == Pipeline::vanilla;
-  const uint2* ranges = vanilla ? vanilla_.ranges() : memory_.range.get();
+  const uint2* ranges =
+      settings_.pipeline == Pipeline::vanilla ? vanilla_.ranges() : memory_.range.get();
   if (ranges == nullptr) return {};
   check(cudaSetDevice(device_), "device");
   return cuda::tile_loads(shape_, ranges);
 }
 
 FrameView CudaView::finished(FrameKind kind, float near_z) {
-  FrameView frame;
-  frame.format = settings_.format;
-  frame.size_px = {shape_.width_px, shape_.height_px};
-  const std::size_t width = static_cast<std::size_t>(shape_.width_px);
-  if (settings_.format == PixelFormat::i420) {
-    std::byte* luma = memory_.host_image.get();
-    std::byte* cb = luma + width * shape_.height_px;
-    std::byte* cr = cb + width * shape_.height_px / 4;
-    frame.space = MemorySpace::host;
-    frame.planes = {Plane{luma, width}, Plane{cb, width / 2}, Plane{cr, width / 2}};
-  } else {
-    frame.space = settings_.space;
-    std::byte* rgb = settings_.space == MemorySpace::host
-                         ? memory_.host_image.get()
-                         : reinterpret_cast<std::byte*>(memory_.rgb.get());
-    frame.planes = {Plane{rgb, 3 * sizeof(float) * width}, Plane{}, Plane{}};
-  }
+  FrameView frame = borrowed_frame(settings_, shape_, memory_.host_image.get(), memory_.rgb.get());
+  frame.depths = depths_.grid();
   frame.stats = frame_stats(*memory_.host_counts.get(), shape_, kind, near_z);
   if (paged_) paged_->end(frame.stats);
   mean_inverse_depth_ = frame.stats.mean_inverse_depth;

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include "render_core/cuda/depth_cells.cuh"
 #include "render_core/cuda/device_pages.cuh"
 #include "render_core/cuda/frame_room.h"
 #include "render_core/cuda/list_builder.cuh"
@@ -77,6 +78,7 @@ class CudaView final : public View {
   ViewMemory memory_;
   ListBuilder builder_;
   VanillaPipeline vanilla_;
+  DepthCells depths_;
   int blend_warps_;
 
   // What memory_ holds of the last frame.

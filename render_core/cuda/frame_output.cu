@@ -31,6 +31,27 @@ FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, Frame
   return stats;
 }
 
+FrameView borrowed_frame(const ViewSettings& settings, const FrameShape& shape,
+                         std::byte* host_image, float* rgb) {
+  FrameView frame;
+  frame.format = settings.format;
+  frame.size_px = {shape.width_px, shape.height_px};
+  const auto width = static_cast<std::size_t>(shape.width_px);
+  const auto height = static_cast<std::size_t>(shape.height_px);
+  if (settings.format == PixelFormat::i420) {
+    std::byte* cb = host_image + width * height;
+    frame.space = MemorySpace::host;
+    frame.planes = {Plane{host_image, width}, Plane{cb, width / 2},
+                    Plane{cb + width * height / 4, width / 2}};
+  } else {
+    frame.space = settings.space;
+    std::byte* pixels =
+        settings.space == MemorySpace::host ? host_image : reinterpret_cast<std::byte*>(rgb);
+    frame.planes = {Plane{pixels, 3 * sizeof(float) * width}, Plane{}, Plane{}};
+  }
+  return frame;
+}
+
 std::vector<std::uint32_t> tile_loads(const FrameShape& shape, const uint2* ranges) {
   std::vector<uint2> copy(shape.tiles());
   check(cudaMemcpy(copy.data(), ranges, copy.size() * sizeof(uint2), cudaMemcpyDeviceToHost),

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,6 +13,11 @@ namespace catgs::cuda {
 /// frame's camera.
 FrameStats frame_stats(const FrameCounts& counts, const FrameShape& shape, FrameKind kind,
                        float near_z);
+
+/// The picture in a View's memory, without its statistics. `rgb`: device memory; `host_image`: its
+/// copy on the host, or that of the planes for an encoder.
+FrameView borrowed_frame(const ViewSettings& settings, const FrameShape& shape,
+                         std::byte* host_image, float* rgb);
 
 /// As View::tile_loads(), on the current device. `ranges`: [tiles], device memory. Waits for the
 /// device; throws CudaError.

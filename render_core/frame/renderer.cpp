@@ -41,6 +41,11 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
                          glm::any(glm::greaterThan(crop.from_px + size, crop.whole_px))))
     return "the part does not lie in the whole picture";
   if (!finite(request.background)) return "background is not finite";
+  const glm::ivec2 cells = request.depth_cells;
+  if (cells != glm::ivec2(0) &&
+      (cells.x < 1 || cells.y < 1 || cells.x > max_depth_cells || cells.y > max_depth_cells))
+    return "depth grid " + std::to_string(cells.x) + "x" + std::to_string(cells.y) +
+           " is outside 1x1…" + std::to_string(max_depth_cells) + " a side";
   std::string mistake = find_mistake(camera.world_from_camera, "camera");
   if (mistake.empty() && request.forecast) {
     mistake = find_mistake(request.forecast->world_from_camera, "forecast");

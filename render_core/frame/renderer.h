@@ -12,6 +12,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "render_core/frame/depth_grid.h"
 #include "render_core/math/camera.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/scene/gaussian_cloud.h"
@@ -99,6 +100,7 @@ struct FrameRequest {
   // Scenes in pages: where the camera may be soon. Pages are read for it, too.
   std::optional<Pose> soon{};
   bool waits_for_pages = false;  // the pages that the frame needs are read before it is drawn
+  glm::ivec2 depth_cells{0};     // of FrameView::depths; 0: not wanted. The CUDA core: catgs only
 };
 
 struct Plane {
@@ -113,6 +115,7 @@ struct FrameView {
   glm::ivec2 size_px{0};
   std::array<Plane, 3> planes{};
   FrameStats stats;
+  DepthGrid depths{};
 };
 
 /// Outcome of the frame path, which never throws.

@@ -5,8 +5,11 @@
 #include <cassert>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <utility>
+
+#include <glm/common.hpp>
 
 #include "render_core/base/error.h"
 #include "render_core/image/host_image.h"
@@ -72,19 +75,28 @@ std::vector<ReferenceSplat> project_all(const GaussianCloud& cloud, const Camera
   return splats;
 }
 
-glm::dvec3 render_pixel(std::span<const ReferenceSplat> splats, glm::ivec2 pixel_px,
-                        const glm::vec3& background, std::uint64_t& pairs) {
+struct ReferencePixel {
+  glm::dvec3 colour;
+  double half_depth = std::numeric_limits<double>::infinity();
+};
+
+ReferencePixel render_pixel(std::span<const ReferenceSplat> splats, glm::ivec2 pixel_px,
+                            const glm::vec3& background, std::uint64_t& pairs) {
+  ReferencePixel out;
   auto pixel = math::empty_pixel<double>();
   const math::Vec2<double> p{pixel_px.x + 0.5, pixel_px.y + 0.5};
   for (const ReferenceSplat& splat : splats) {
     const double square =
         math::whitened_square(splat.whitening, {p.x - splat.centre_px.x, p.y - splat.centre_px.y});
     if (square > splat.reach) continue;
+    const double before = pixel.transmittance;
     if (!math::blend(pixel, splat.log2_opacity - square, splat.colour)) break;
+    if (before >= 0.5 && pixel.transmittance < 0.5) out.half_depth = splat.depth;
     ++pairs;
   }
   const auto colour = math::resolve(pixel, to_vec3(background));
-  return {colour.x, colour.y, colour.z};
+  out.colour = {colour.x, colour.y, colour.z};
+  return out;
 }
 
 void convert_to_i420(const std::vector<glm::dvec3>& rgb, const HostImage& image) {
@@ -104,18 +116,19 @@ void convert_to_i420(const std::vector<glm::dvec3>& rgb, const HostImage& image)
   }
 }
 
-struct PixelColours {
+struct Pixels {
   std::vector<glm::dvec3> colours;
+  std::vector<double> half_depths;
   FrameStats stats;
 };
 
-PixelColours render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
-                           std::span<const glm::ivec2> pixels, ThreadPool& pool) {
+Pixels render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
+                     std::span<const glm::ivec2> pixels, ThreadPool& pool) {
   using Clock = std::chrono::steady_clock;
   const auto ms_since = [](Clock::time_point start) {
     return std::chrono::duration<float, std::milli>(Clock::now() - start).count();
   };
-  PixelColours out;
+  Pixels out;
   const auto start = Clock::now();
   const std::vector<ReferenceSplat> splats = project_all(cloud, request.camera, pool);
   out.stats.visible = static_cast<std::uint32_t>(splats.size());
@@ -124,16 +137,42 @@ PixelColours render_pixels(const GaussianCloud& cloud, const FrameRequest& reque
   const auto blend_start = Clock::now();
   constexpr std::size_t run = 64;  // pixels a task takes
   out.colours.resize(pixels.size());
+  out.half_depths.resize(pixels.size());
   std::atomic<std::uint64_t> pairs{0};
   pool.parallel_for((pixels.size() + run - 1) / run, [&](std::size_t task) {
     std::uint64_t blended = 0;
-    for (std::size_t i = task * run; i < std::min(pixels.size(), (task + 1) * run); ++i)
-      out.colours[i] = render_pixel(splats, pixels[i], request.background, blended);
+    for (std::size_t i = task * run; i < std::min(pixels.size(), (task + 1) * run); ++i) {
+      const ReferencePixel pixel = render_pixel(splats, pixels[i], request.background, blended);
+      out.colours[i] = pixel.colour;
+      out.half_depths[i] = pixel.half_depth;
+    }
     pairs += blended;
   });
   out.stats.blended_pairs = pairs;
   out.stats.stage_ms[static_cast<std::size_t>(Stage::blend)] = ms_since(blend_start);
   return out;
+}
+
+/// The medians of a depth grid. A cell smaller than a pixel has the one around its middle.
+std::vector<float> depth_cells(const std::vector<double>& half_depths, glm::ivec2 size_px,
+                               glm::ivec2 cells) {
+  std::vector<float> medians;
+  for (int row = 0; row < cells.y; ++row) {
+    for (int column = 0; column < cells.x; ++column) {
+      const glm::ivec2 cell(column, row), middle = (2 * cell + 1) * size_px / (2 * cells);
+      const glm::ivec2 begin = glm::min(cell * size_px / cells, middle);
+      const glm::ivec2 end = glm::max((cell + 1) * size_px / cells, middle + 1);
+      std::vector<float> values;
+      for (int y = begin.y; y < end.y; ++y)
+        for (int x = begin.x; x < end.x; ++x)
+          values.push_back(
+              static_cast<float>(1.0 / half_depths[static_cast<std::size_t>(y) * size_px.x + x]));
+      const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::ranges::nth_element(values, median);
+      medians.push_back(*median);
+    }
+  }
+  return medians;
 }
 
 class ReferenceView final : public View {
@@ -160,7 +199,7 @@ class ReferenceView final : public View {
     std::vector<glm::ivec2> pixels;
     for (int y = 0; y < size.y; ++y)
       for (int x = 0; x < size.x; ++x) pixels.emplace_back(x, y);
-    const PixelColours image = render_pixels(*cloud_, request, pixels, *pool_);
+    const Pixels image = render_pixels(*cloud_, request, pixels, *pool_);
 
     image_.resize(settings_.format, size);
     if (settings_.format == PixelFormat::i420) {
@@ -171,7 +210,9 @@ class ReferenceView final : public View {
           image_.rgb_row(pixels[i].y)[pixels[i].x * 3 + c] =
               static_cast<float>(image.colours[i][c]);
     }
-    frame = {settings_.format, MemorySpace::host, size, image_.planes(), image.stats};
+    inverse_depths_ = depth_cells(image.half_depths, size, request.depth_cells);
+    frame = {settings_.format, MemorySpace::host, size,
+             image_.planes(),  image.stats,       {request.depth_cells, inverse_depths_}};
     return {};
   }
 
@@ -179,6 +220,7 @@ class ReferenceView final : public View {
   std::shared_ptr<ThreadPool> pool_;
   ViewSettings settings_;
   HostImage image_;
+  std::vector<float> inverse_depths_;
 };
 
 class ReferenceRenderer final : public Renderer {

@@ -155,7 +155,7 @@ int LwsWebsocket::service_writeable(std::vector<std::byte>& scratch) {
   // libwebsockets writes its framing into the bytes before the payload.
   scratch.assign(LWS_PRE, std::byte{0});
   const TimePoint now = Clock::now();
-  if (packet->frame) wire::append_frame_header(*packet->frame, now, scratch);
+  if (packet->frame) wire::append_frame_header(*packet->frame, packet->depths.get(), now, scratch);
   scratch.insert(scratch.end(), packet->bytes.begin(), packet->bytes.end());
   const std::size_t size = scratch.size() - LWS_PRE;
   auto* payload = reinterpret_cast<unsigned char*>(scratch.data()) + LWS_PRE;

@@ -45,6 +45,7 @@ struct Settings {
   int max_fps = 0;              // 0: the server's default
   int max_bitrate_kbps = 0;
   bool fixed_quality = false;
+  bool depths = false;  // frames bring a depth grid, where the core makes them
 
   bool operator==(const Settings&) const = default;
 };

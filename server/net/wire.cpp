@@ -211,6 +211,13 @@ std::uint32_t elapsed_us(TimePoint from, TimePoint to) {
   return static_cast<std::uint32_t>(std::clamp<std::int64_t>(us, 0, UINT32_MAX));
 }
 
+void fill(const PackedDepths& depths, v1::FrameHeader& header) {
+  header.set_depth_columns(static_cast<std::uint32_t>(depths.cells.x));
+  header.set_depth_rows(static_cast<std::uint32_t>(depths.cells.y));
+  header.set_depth_scale(depths.scale);
+  header.set_depth_codes(depths.codes.data(), depths.codes.size());
+}
+
 v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   v1::FrameHeader header;
   header.set_frame_id(ticket.frame_id);
@@ -248,8 +255,10 @@ OutgoingMessage serialize(const ServerMessage& message) {
   return {topic, std::move(bytes)};
 }
 
-void append_frame_header(const FrameTicket& ticket, TimePoint now, std::vector<std::byte>& out) {
-  const v1::FrameHeader header = frame_header(ticket, now);
+void append_frame_header(const FrameTicket& ticket, const PackedDepths* depths, TimePoint now,
+                         std::vector<std::byte>& out) {
+  v1::FrameHeader header = frame_header(ticket, now);
+  if (depths) fill(*depths, header);
   const std::size_t header_size = header.ByteSizeLong();
   out.push_back(static_cast<std::byte>(Kind::frame));
   for (std::size_t rest = header_size;; rest >>= 7) {

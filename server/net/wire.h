@@ -32,7 +32,8 @@ std::variant<ClientMessage, ParseError> parse_client_message(std::span<const std
 OutgoingMessage serialize(const ServerMessage& message);
 
 /// Appends the bytes before a frame's bitstream: kind byte, varint, FrameHeader. `now` is the time
-/// at which the packet is handed to the socket.
-void append_frame_header(const FrameTicket& ticket, TimePoint now, std::vector<std::byte>& out);
+/// at which the packet is handed to the socket. `depths`: null: none.
+void append_frame_header(const FrameTicket& ticket, const PackedDepths* depths, TimePoint now,
+                         std::vector<std::byte>& out);
 
 }  // namespace catgs::wire

@@ -127,6 +127,7 @@ Settings parse(const v1::Settings& message) {
   settings.max_bitrate_kbps =
       checked_or_zero("settings.max_bitrate_kbps", message.max_bitrate_kbps(), 100, 200'000);
   settings.fixed_quality = message.fixed_quality();
+  settings.depths = message.depths();
   return settings;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "render_core/math/camera.h"
 #include "server/base/clock.h"
 #include "server/encode/encoder.h"
+#include "server/encode/packed_depths.h"
 
 namespace catgs {
 
@@ -46,6 +48,12 @@ struct FrameTicket {
 struct OutgoingFrame {
   FrameTicket ticket;
   std::vector<std::byte> bitstream;
+  std::shared_ptr<const PackedDepths> depths{};  // of the picture; null: none
+
+  /// What the link carries, nearly.
+  [[nodiscard]] std::size_t bytes() const {
+    return bitstream.size() + (depths ? depths->codes.size() : 0);
+  }
 };
 
 /// A message's topic. A newer message replaces one on the same topic, except for events.

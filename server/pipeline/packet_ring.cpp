@@ -24,7 +24,7 @@ bool PacketRing::push(OutgoingMessage message) {
       (messages == 0 || message_bytes_ + size <= limits_.message_bytes);  // one always fits
   if (!fits) return false;
   message_bytes_ += size;
-  packets_.push_back({std::nullopt, std::move(message.bytes), message.topic});
+  packets_.push_back({std::nullopt, std::move(message.bytes), message.topic, nullptr});
   return true;
 }
 
@@ -56,7 +56,8 @@ std::vector<std::uint64_t> PacketRing::push(OutgoingFrame frame) {
     waiting_for_idr_ = false;
     ++frames_;
     frame_bytes_ += size;
-    packets_.push_back({frame.ticket, std::move(frame.bitstream), Topic::event});
+    packets_.push_back(
+        {frame.ticket, std::move(frame.bitstream), Topic::event, std::move(frame.depths)});
   }
   return dropped;
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,10 @@ class PacketRing {
     std::size_t message_bytes = 4u << 20;
   };
   struct Packet {
-    std::optional<FrameTicket> frame;  // none: a message
-    std::vector<std::byte> bytes;      // the bitstream, or the message as it goes out
-    Topic topic = Topic::event;        // of a message
+    std::optional<FrameTicket> frame;            // none: a message
+    std::vector<std::byte> bytes;                // the bitstream, or the message as it goes out
+    Topic topic = Topic::event;                  // of a message
+    std::shared_ptr<const PackedDepths> depths;  // of a frame; null: none
   };
 
   PacketRing() = default;

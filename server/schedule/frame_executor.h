@@ -25,7 +25,8 @@ struct Stream {
   StreamSettings settings;
   std::unique_ptr<View> view;
   StreamEncoders encoders;
-  FrameView picture;  // borrowed from `view`: the last one rendered
+  FrameView picture;                             // borrowed from `view`: the last one rendered
+  std::shared_ptr<const PackedDepths> depths{};  // of that picture; null: none
 };
 
 /// Why a stream could not be opened or a frame not made, by what the caller can do about it.

@@ -1,5 +1,6 @@
 #include "server/schedule/pool_executor.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -64,7 +65,11 @@ bool render_now(FrameJob& job, FrameResult& result) {
       return false;
     }
     result.stats = stream.picture.stats;
+    const DepthGrid& grid = stream.picture.depths;
+    stream.depths.reset();
+    if (grid.cells.x > 0) stream.depths = std::make_shared<const PackedDepths>(pack(grid));
   }
+  result.frame.depths = job.stream->depths;
   ticket.render = {start, Clock::now()};
   return true;
 }
@@ -86,7 +91,10 @@ void encode_now(FrameJob& job, const EncoderFactory& encoders, FrameResult& resu
   const TimePoint start = Clock::now();
   Encoder* const encoder = encoder_for(job, encoders, result);
   if (!encoder) return;
-  encoder->set_rate(job.bitrate_kbps, job.real_fps);
+  const auto& depths = result.frame.depths;
+  const std::size_t depth_bits = depths ? 8 * depths->codes.size() : 0;
+  const int depth_kbps = static_cast<int>(depth_bits) * job.real_fps / 1000;
+  encoder->set_rate(std::max(min_bitrate_kbps, job.bitrate_kbps - depth_kbps), job.real_fps);
   const EncodeStatus status = encoder->encode(job.stream->picture, job.force_idr, encoded);
   ticket.encode = {start, Clock::now()};
   if (!status.ok) {

@@ -169,7 +169,7 @@ bool FrameLoop::made(const FrameResult& result, TimePoint now) {
   if (!ticket.refined) settled_ = result.stats.settled;
   if (!ticket.still) detail_.update(cost_.render(), interval(), now);
   if (result.sharp) refinements_left_ = 0;
-  const std::size_t bytes = result.frame.bitstream.size();
+  const std::size_t bytes = result.frame.bytes();
   if (ticket.still) {
     const std::chrono::duration<double> passing = flow_.time_on_link(bytes, now);
     next_refinement_ =

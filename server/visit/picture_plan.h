@@ -46,6 +46,8 @@ class PicturePlan {
   [[nodiscard]] glm::ivec2 still_size_px() const {
     return larger_stills_ ? still_size_px_ : moving_.size_px;
   }
+  /// Whether frames bring a depth grid.
+  [[nodiscard]] bool depths() const { return settings_.depths; }
   [[nodiscard]] const EncoderEffort& effort() const { return effort_; }
   [[nodiscard]] double pixel_share() const { return pixel_share_; }
 

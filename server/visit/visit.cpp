@@ -199,6 +199,9 @@ FrameOrder Visit::start_frame(TimePoint now) {
   // Only time decides. If credit was missing, the first picture of a pose may already be the still.
   FrameOrder order = stream_.begin_frame(frames_.rests(now), now);
   frames_.start(order, now);
+  // An orthographic picture is moved without them.
+  if (stream_.plan().depths() && order.ticket.view_height == 0.0f)
+    order.request.depth_cells = depth_cells_of(order.ticket.size_px);
   return order;
 }
 

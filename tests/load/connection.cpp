@@ -130,6 +130,7 @@ v1::Settings Connection::wanted_settings() const {
   settings.set_max_fps(static_cast<std::uint32_t>(settings_.wishes.fps));
   settings.set_max_bitrate_kbps(static_cast<std::uint32_t>(settings_.wishes.max_bitrate_kbps));
   settings.set_fixed_quality(settings_.wishes.fixed_quality);
+  settings.set_depths(settings_.display.depths);
   return settings;
 }
 
@@ -315,7 +316,7 @@ void Connection::take_frame(const FrameMessage& frame) {
   report_.stats.frame_received({.frame_id = header.frame_id(),
                                 .pose_id = header.pose_id(),
                                 .idr = header.idr(),
-                                .bytes = frame.bitstream.size(),
+                                .bytes = frame.bitstream.size() + header.depth_codes().size(),
                                 .pixels = std::uint64_t{header.width_px()} * header.height_px(),
                                 .wait_us = header.wait_us(),
                                 .render_us = header.render_us(),
@@ -344,8 +345,9 @@ void Connection::show(const v1::Ack& ack, std::int64_t decoded_us) {
   undisplayed_->set_decoded_us(decoded_us);
 }
 
-double Connection::warp_distance(const Pose& camera) const {
+double Connection::warp_distance(const Pose& camera, const DisplayLog::Frame& frame) const {
   if (settings_.display.warp == WarpMode::off) return 0.0;
+  if (frame.depths.cells.x > 0) return median_distance(frame.depths);
   const float to_focus =
       glm::dot(focus_ - camera.position, camera.orientation * glm::vec3(0.0f, 0.0f, 1.0f));
   const bool to_plane = settings_.display.warp == WarpMode::plane && to_focus > 0.0f;
@@ -392,7 +394,7 @@ asio::awaitable<void> Connection::refresh_display() {
     DisplayLog::Refresh refresh{.time_us = now,
                                 .frame = log.frames.size() - 1,
                                 .camera = camera,
-                                .distance = warp_distance(camera),
+                                .distance = warp_distance(camera, log.frames.back()),
                                 .overscan = overscan().y};
     if (report_.rest) {
       refresh.rest = report_.rest->number;

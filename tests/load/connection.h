@@ -43,7 +43,7 @@ class Connection {
   boost::asio::awaitable<void> flood();
   boost::asio::awaitable<void> drop_line();
   boost::asio::awaitable<void> refresh_display();
-  [[nodiscard]] double warp_distance(const Pose& camera) const;
+  [[nodiscard]] double warp_distance(const Pose& camera, const DisplayLog::Frame& frame) const;
   void choose_overscan();
   boost::asio::awaitable<void> attempt(boost::asio::awaitable<void> part);
 

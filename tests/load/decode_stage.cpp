@@ -9,6 +9,7 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include "tests/load/clock.h"
+#include "tests/load/unpacked_depths.h"
 #include "tests/load/waiting.h"
 
 namespace catgs::load {
@@ -19,6 +20,21 @@ namespace asio = boost::asio;
 constexpr std::size_t max_queued = 16;
 constexpr std::int64_t min_stills_apart_us = 10'000;
 constexpr std::size_t max_stills = 120;
+
+std::size_t depth_bytes(const v1::FrameHeader& header) {
+  return sizeof(float) * std::size_t{header.depth_columns()} * header.depth_rows();
+}
+
+/// Without cells where there are none. Nothing: they are broken.
+std::optional<Depths> depths_of(const v1::FrameHeader& header) {
+  if (header.depth_columns() == 0) return Depths{};
+  const auto* codes = reinterpret_cast<const std::byte*>(header.depth_codes().data());
+  const glm::ivec2 cells(header.depth_columns(), header.depth_rows());
+  auto unpacked =
+      unpack({cells, header.depth_scale(), {codes, codes + header.depth_codes().size()}});
+  if (!unpacked) return {};
+  return Depths{cells, std::move(*unpacked)};
+}
 
 }  // namespace
 
@@ -149,12 +165,15 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
 void DecodeStage::keep_frame(Item& item) {
   if (!report_.display || report_.display->full) return;
   DisplayLog& log = *report_.display;
-  if (!log.take_room(item.bitstream.size()))
+  if (!log.take_room(item.bitstream.size() + depth_bytes(item.header)))
     return report_.stats.error("the run is too long: no further frame is judged");
   log.near_z = scene_.near_z();
   log.scene_id = scene_.scene_id();
+  std::optional<Depths> depths = depths_of(item.header);
+  if (!depths) report_.stats.error("the depths of a frame cannot be unpacked");
   log.frames.push_back({.eye = {from_wire(item.header.render_pose()), item.header.fov_y_rad()},
                         .size_px = {item.header.width_px(), item.header.height_px()},
+                        .depths = depths ? std::move(*depths) : Depths{},
                         .pose_us = item.header.pose_client_time_us(),
                         .codec = *codec_ == v1::CODEC_MJPEG ? Codec::mjpeg : Codec::h264,
                         .first = std::exchange(decoder_is_new_, false),

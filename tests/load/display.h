@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include "server/encode/encoder.h"
+#include "tests/load/depth_warp.h"
 #include "tests/load/warp.h"
 
 namespace catgs::load {
@@ -19,6 +20,7 @@ struct DisplayLog {
   struct Frame {
     Eye eye;  // that it was drawn for
     glm::ivec2 size_px{0};
+    Depths depths{};
     std::int64_t pose_us = 0;  // when the pose behind it was sampled
     Codec codec = Codec::h264;
     bool first = false;  // of its decoder
@@ -28,7 +30,7 @@ struct DisplayLog {
     std::int64_t time_us = 0;
     std::size_t frame = 0;      // the newest decoded
     Pose camera;                // the visitor's
-    double distance = 0.0;      // to the plane for which the warp is exact; 0: no warp
+    double distance = 0.0;      // to the plane that a warp by one plane is exact for; 0: no warp
     double overscan = 1.0;      // height of pictures over that of the view
     int rest = 0;               // counted from 1; 0: the camera moves
     std::int64_t after_us = 0;  // at rest: since the last pose that moved

@@ -78,7 +78,12 @@ Pair shown_at(const DisplayLog& log, std::size_t number, const Image& picture) {
   Pair pair;
   pair.refresh = number;
   pair.uncovered = uncovered_share(matrix);
-  pair.shown = warp_image(picture, matrix, canvas_px);
+  const DisplayLog::Frame& frame = log.frames[refresh.frame];
+  const bool warps = matrix != unmoved || canvas_px != picture.size_px;
+  pair.shown = warps && frame.depths.cells.x > 0 ? warp_by_depths(picture, frame.depths, frame.eye,
+                                                                  {refresh.camera, log.fov_y_rad},
+                                                                  view_px.x / view_px.y, canvas_px)
+                                                 : warp_image(picture, matrix, canvas_px);
   if (canvas_px != log.view_px) pair.shown = warp_image(pair.shown, unmoved, log.view_px);
   return pair;
 }

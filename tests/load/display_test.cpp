@@ -10,6 +10,7 @@
 #include "tests/load/display_check.h"
 #include "tests/load/metrics.h"
 #include "tests/load/overscan.h"
+#include "tests/load/unpacked_depths.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test.h"
 
@@ -45,6 +46,55 @@ TEST(Warp, IsThatOfTheSharedNumbers) {
       EXPECT_NEAR(reached[i], warp.at("reach")[i], 1e-5);
     }
     EXPECT_NEAR(uncovered_share(m), warp.at("uncovered"), 1e-6);
+  }
+}
+
+// tests/web_client/depth_mesh.test.ts holds the page's mesh to the same numbers.
+TEST(DepthWarp, MeshIsThatOfTheSharedNumbers) {
+  std::ifstream file(CATGS_WARP_GOLDEN);
+  const json mesh = json::parse(file).at("mesh");
+  const Depths depths{{mesh.at("columns"), mesh.at("rows")}, mesh.at("inverse_depths")};
+  EXPECT_NEAR(median_distance(depths), mesh.at("median_distance").get<double>(), 1e-5);
+  const std::vector<MeshPoint> points =
+      mesh_points(depths, eye_of(mesh.at("picture")), eye_of(mesh.at("view")),
+                  mesh.at("picture_aspect"), mesh.at("view_aspect"));
+  ASSERT_EQ(points.size(), mesh.at("points").size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(points[i].view[axis], mesh.at("points")[i][axis].get<double>(), 1e-5) << i;
+}
+
+/// A picture of one line: red on the left half, green on the right.
+const Image halves{{4, 1}, {1, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0}};
+
+TEST(DepthWarp, PicturesStayWhereTheyAreForAStillCamera) {
+  const Eye eye{{}, 1.0f};
+  const Depths depths{{2, 1}, {1.0f, 0.1f}};
+  const Image seen = warp_by_depths(halves, depths, eye, eye, 4.0, {4, 1});
+  for (std::size_t i = 0; i < seen.rgb.size(); ++i)
+    EXPECT_NEAR(seen.rgb[i], halves.rgb[i], 1e-5f) << i;
+}
+
+TEST(DepthWarp, NearThingsMoveFartherAndCoverFarOnes) {
+  constexpr float half_fov = 0.5f;
+  const Eye picture{{}, 2.0f * half_fov};
+  Eye view = picture;
+  const float half_width = 4.0f * std::tan(half_fov);  // at depth 1
+  view.world_from_camera.position.x = -0.25f * half_width;
+  // The left half is at depth 1: it moves by a quarter of the half width, the right half does not.
+  const Image seen = warp_by_depths(halves, {{2, 1}, {1.0f, 0.0f}}, picture, view, 4.0, {64, 1});
+  const auto red = [&](int x) { return seen.rgb[static_cast<std::size_t>(3 * x)]; };
+  EXPECT_NEAR(red(20), 1.0f, 1e-5f);
+  EXPECT_NEAR(red(63), 0.0f, 1e-5f);
+  // Half way between the depths, the edge has moved half as far as what is near.
+  EXPECT_GT(red(35), 0.5f);
+  EXPECT_LT(red(36), 0.5f);
+  // From the other side, the near half leaves what it covered. Nothing is empty there.
+  view.world_from_camera.position.x *= -1.0f;
+  const Image behind = warp_by_depths(halves, {{2, 1}, {1.0f, 0.0f}}, picture, view, 4.0, {64, 1});
+  for (int x = 0; x < 64; ++x) {
+    const float* at = &behind.rgb[static_cast<std::size_t>(3 * x)];
+    EXPECT_NEAR(at[0] + at[1], 1.0f, 1e-4f) << x;
   }
 }
 
@@ -186,10 +236,12 @@ class SmallCity : public ::testing::Test {
     const float fov_y_rad = widened_fov(start_.fov_y_rad, overscan.y);
     request.camera = make_camera(start_.world_from_camera, picture_px,
                                  focal_from_fov_y(fov_y_rad, picture_px.y), near_z_);
+    request.depth_cells = depth_cells_of(picture_px);
     FrameView frame;
     ASSERT_TRUE(view->render(request, frame).ok());
     EncodedFrame encoded;
     ASSERT_TRUE(encoder->encode(frame, true, encoded).ok);
+    depths_ = {frame.depths.cells, unpack(pack(frame.depths)).value()};
     frame_ = {.eye = {start_.world_from_camera, fov_y_rad},
               .size_px = picture_px,
               .pose_us = 0,
@@ -236,6 +288,7 @@ class SmallCity : public ::testing::Test {
   inline static Eye start_;
   inline static float near_z_ = 0.2f;
   inline static DisplayLog::Frame frame_;
+  inline static Depths depths_;
 };
 
 using Frame = DisplayLog::Frame;
@@ -249,6 +302,21 @@ TEST_F(SmallCity, WarpedPicturesAreNearTheExactOne) {
   EXPECT_GE(warp.ssim, 0.97);
   EXPECT_GE(warp.psnr_db, 32.0);
   EXPECT_EQ(warp.uncovered, 0.0);
+}
+
+TEST_F(SmallCity, DepthsShowWhatAStepOfTheCameraMoves) {
+  const auto after_a_step = [](bool by_depths, glm::vec3 step) {
+    return judged([&](Frame& frame, Refresh& refresh) {
+      refresh.camera.position += refresh.camera.orientation * step;
+      if (by_depths) frame.depths = depths_;
+    });
+  };
+  for (const glm::vec3 step : {glm::vec3(0.3f, 0, 0), glm::vec3(0, 0.3f, 0), glm::vec3(0, 0, 1)}) {
+    const JudgedRefresh turned_only = after_a_step(false, step), warp = after_a_step(true, step);
+    EXPECT_GE(warp.ssim, turned_only.ssim + 0.03);
+    EXPECT_GE(warp.psnr_db, turned_only.psnr_db + 2.0);
+  }
+  EXPECT_GE(after_a_step(true, glm::vec3(0)).ssim, 0.97);  // turns alone are exact as before
 }
 
 TEST_F(SmallCity, WrongWarpsAndPosesAreSeen) {

@@ -73,6 +73,7 @@ class TrajectoryMaker {
 /// With the warp that `auto` means. A page that does not warp wants no overscan either.
 DisplayOptions display_of(const GroupOptions& group) {
   DisplayOptions display = group.display;
+  display.depths = display.judged && display.warp == WarpMode::automatic;
   if (display.warp == WarpMode::automatic)
     display.warp = group.script.script == "orbit" ? WarpMode::plane : WarpMode::turn;
   if (display.warp == WarpMode::off) display.overscan = glm::dvec2(1.0);

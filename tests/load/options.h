@@ -47,7 +47,9 @@ enum class WarpMode { automatic, turn, plane, off };
 struct DisplayOptions {
   bool judged = false;  // by exact pictures, after the run
   int hz = 60;
-  WarpMode warp = WarpMode::automatic;  // as in the page's mode: plane for orbits, else turn
+  // automatic: as the page, by depths; where they are missing, plane for orbits, else turn.
+  WarpMode warp = WarpMode::automatic;
+  bool depths = false;  // asks for them: set by `warp`
   // Sides of pictures over those of the view; nothing: chosen by the motion, as the page does.
   std::optional<glm::dvec2> overscan{};
 };

@@ -61,25 +61,28 @@ float widened_fov(float fov_y_rad, double factor) {
   return std::clamp(static_cast<float>(wide), 0.1f, 2.8f);
 }
 
+void append_sample(const Image& picture, const glm::dvec2& at, Image& out) {
+  const glm::dvec2 most(picture.size_px - 1);
+  const glm::dvec2 px =
+      glm::clamp((0.5 + 0.5 * at) * glm::dvec2(picture.size_px) - 0.5, glm::dvec2(0.0), most);
+  const glm::ivec2 low(px), high = glm::min(low + 1, picture.size_px - 1);
+  const glm::vec2 part(px - glm::dvec2(low));
+  const float *above = picture.row(low.y), *below = picture.row(high.y);
+  for (int c = 0; c < 3; ++c) {
+    const int left = 3 * low.x + c, right = 3 * high.x + c;
+    const float top = std::lerp(above[left], above[right], part.x);
+    out.rgb.push_back(std::lerp(top, std::lerp(below[left], below[right], part.x), part.y));
+  }
+}
+
 Image warp_image(const Image& picture, const glm::dmat3& picture_from_view, glm::ivec2 size_px) {
   Image view{size_px, {}};
   view.rgb.reserve(3 * static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y));
-  const glm::dvec2 most(picture.size_px - 1);
   for (int y = 0; y < size_px.y; ++y) {
     for (int x = 0; x < size_px.x; ++x) {
       const glm::dvec2 at = (2.0 * glm::dvec2(x, y) + 1.0) / glm::dvec2(size_px) - 1.0;
       const glm::dvec3 p = picture_from_view * glm::dvec3(at, 1.0);
-      const glm::dvec2 place = 0.5 + 0.5 * glm::dvec2(p) / std::max(p.z, 1e-6);
-      const glm::dvec2 px =
-          glm::clamp(place * glm::dvec2(picture.size_px) - 0.5, glm::dvec2(0.0), most);
-      const glm::ivec2 low(px), high = glm::min(low + 1, picture.size_px - 1);
-      const glm::vec2 part(px - glm::dvec2(low));
-      const float *above = picture.row(low.y), *below = picture.row(high.y);
-      for (int c = 0; c < 3; ++c) {
-        const int left = 3 * low.x + c, right = 3 * high.x + c;
-        const float top = std::lerp(above[left], above[right], part.x);
-        view.rgb.push_back(std::lerp(top, std::lerp(below[left], below[right], part.x), part.y));
-      }
+      append_sample(picture, glm::dvec2(p) / std::max(p.z, 1e-6), view);
     }
   }
   return view;

@@ -38,6 +38,9 @@ double uncovered_share(const glm::dmat3& picture_from_view);
 /// Field of view whose image plane is `factor` times as large, limited to the range of the wire.
 float widened_fov(float fov_y_rad, double factor);
 
+/// Appends the picture's colour at a point: bilinear, and its border repeated outside of it.
+void append_sample(const Image& picture, const glm::dvec2& at, Image& out);
+
 /// The picture as the view sees it: bilinear, and its border repeated outside of it.
 Image warp_image(const Image& picture, const glm::dmat3& picture_from_view, glm::ivec2 size_px);
 

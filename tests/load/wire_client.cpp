@@ -5,7 +5,7 @@ namespace {
 
 constexpr std::byte kind_message{1};
 constexpr std::byte kind_frame{2};
-constexpr std::uint32_t max_header_bytes = 1024;
+constexpr std::uint32_t max_header_bytes = 32 * 1024;  // the depths of 128x128 cells, too
 
 /// Base-128 varint of up to 32 bits; false when it does not end within `bytes`.
 bool take_varint(std::span<const std::byte>& bytes, std::uint32_t& value) {

@@ -3,8 +3,10 @@ import { axis_angle, identity, multiply, type Quat } from '#client/base/vector';
 import { widened_fov, type Eye } from '#client/camera/eye';
 import type { Picture } from '#client/decode/picture';
 import { Display } from '#client/present/display';
-import type { Placing, Presenter } from '#client/present/presenter';
+import type { Depths, Placing, Presenter } from '#client/present/presenter';
 import { warped } from '#client/present/warp';
+import { FrameHeaderSchema, type FrameHeader } from '#client/wire/wire';
+import { create } from '@bufbuild/protobuf';
 import { frame_sizes } from '#client/worker/frame_sizes';
 import golden from '../support/warp_golden.json';
 
@@ -12,6 +14,9 @@ const at = (yaw: number): Eye => {
   const orientation: Quat = yaw === 0 ? identity : axis_angle([0, -1, 0], yaw);
   return { position: [0, 0, 0], orientation, fov_y_rad: 1 };
 };
+
+const header = (widthPx: number, heightPx: number, depthColumns = 0): FrameHeader =>
+  create(FrameHeaderSchema, { widthPx, heightPx, depthColumns });
 
 let drawn: (Placing | undefined)[];
 let redrawn: Placing[];
@@ -58,7 +63,7 @@ describe('the display', () => {
 
   it('draws each picture as the camera of now sees it, and again when that moves', async () => {
     look(0.05);
-    await display.draw(picture, at(0), 640, 360);
+    await display.draw(picture, at(0), header(640, 360));
     expect(warped(drawn[0]!.matrix, 0, 0)![0]).toBeLessThan(-0.01);
     expect(display.read()!.view.orientation).toEqual(at(0.05).orientation);
     look(0.02);
@@ -72,13 +77,55 @@ describe('the display', () => {
     expect(redrawn).toHaveLength(2);
   });
 
+  it('draws a picture on its depths where it brings them', async () => {
+    const depths: Depths = {
+      columns: 1,
+      rows: 1,
+      inverse_depths: new Float32Array(1),
+      distance: 2,
+      nearest: 0.5,
+    };
+    const asked: unknown[] = [];
+    const surface = { draw: () => undefined };
+    const part = {
+      unpack_depths: ({ depthColumns }: FrameHeader) => (depthColumns === 1 ? depths : undefined),
+      depth_surface: (...given: unknown[]) => (asked.push(given), surface),
+    };
+    look(0.05);
+    await display.draw(picture, at(0), header(640, 360, 1));
+    expect(drawn.pop()!.surface).toBeUndefined(); // the part is not there yet
+    expect(display.wants_depths).toBe(false);
+    display.depth_part = part as unknown as typeof import('#client/present/depth_mesh');
+    expect(display.wants_depths).toBe(true);
+    await display.draw(picture, at(0), header(640, 360, 1));
+    expect(drawn.pop()!.surface).toBe(surface);
+    expect(asked).toEqual([[depths, at(0), at(0.05), 640 / 360, 16 / 9]]);
+    look(0.02);
+    next_refresh();
+    expect(redrawn.pop()!.surface).toBe(surface);
+    await display.draw(picture, at(0), header(640, 360));
+    expect(drawn.pop()!.surface).toBeUndefined();
+    display.mode = 'off';
+    expect(display.wants_depths).toBe(false);
+  });
+
+  it('is warped for the plane of its median depth where one plane has to do', async () => {
+    const depths = { distance: 2 } as Depths;
+    const part = { unpack_depths: () => depths, depth_surface: () => undefined };
+    display.depth_part = part as unknown as typeof import('#client/present/depth_mesh');
+    const moved: Eye = { ...at(0), position: [0.1, 0, 0] };
+    display.camera = { pose_id: 1, time_us: 0, eye: moved, distance: Infinity };
+    await display.draw(picture, at(0), header(640, 360, 1));
+    expect(warped(drawn[0]!.matrix, 0, 0)![0]).toBeGreaterThan(0.01);
+  });
+
   it('leaves the picture as it is when the camera has jumped', async () => {
     look(0);
-    await display.draw(picture, at(0), 640, 360);
+    await display.draw(picture, at(0), header(640, 360));
     look(1.5);
     next_refresh();
     expect(redrawn).toEqual([]);
-    await display.draw(picture, at(0), 640, 360);
+    await display.draw(picture, at(0), header(640, 360));
     expect(drawn[1]).toBeUndefined();
     expect(display.read()!.view.orientation).toEqual(identity);
   });
@@ -89,7 +136,7 @@ describe('the display', () => {
     const { x, y } = display.overscan;
     expect(x).toBeGreaterThan(y);
     const wide = { ...at(0), fov_y_rad: widened_fov(1, y) };
-    await display.draw(picture, wide, 1600 * x, 900 * y);
+    await display.draw(picture, wide, header(1600 * x, 900 * y));
     expect(drawn[0]).toMatchObject({ width_px: 1600, height_px: 900 });
     const { matrix } = drawn[0]!;
     expect(warped(matrix, 1, 1)).toEqual([expect.closeTo(1 / x, 5), expect.closeTo(1 / y, 5)]);
@@ -108,7 +155,7 @@ describe('the display', () => {
     const sizes = frame_sizes(display.size, quality, display.overscan, Infinity);
     const [wide_px, high_px] = [sizes.stillWidthPx!, sizes.stillHeightPx!];
     const eye = { ...at(0), fov_y_rad: widened_fov(1, display.overscan.y) };
-    await display.draw(picture, eye, wide_px, high_px);
+    await display.draw(picture, eye, header(wide_px, high_px));
     expect(drawn[0]).toMatchObject({ width_px, height_px });
     const [x, y] = warped(drawn[0]!.matrix, 1 / width_px - 1, 1 / height_px - 1)!;
     expect((x + 1) * wide_px).toBeCloseTo(wide_px - width_px + 1, 2);
@@ -125,7 +172,7 @@ describe('the display', () => {
       display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
       const picture_eye = at_time(s - lag_s);
       const eye = { ...picture_eye, fov_y_rad: widened_fov(1, display.overscan.y) };
-      await display.draw(picture, eye, 1600 * display.overscan.x, 900 * display.overscan.y);
+      await display.draw(picture, eye, header(1600 * display.overscan.x, 900 * display.overscan.y));
       // The policy looks at twelve pictures before it asks for anything.
       if (i > 20) expect(display.read()!.view.uncovered).toBeLessThanOrEqual(0.01);
     }
@@ -149,7 +196,7 @@ describe('the display', () => {
         display.camera = { pose_id: i, time_us: now_us, eye: at_time(s), distance: Infinity };
         const { x, y } = display.overscan;
         const eye = { ...at_time(s - turn.lag_s), fov_y_rad: widened_fov(1, y) };
-        await display.draw(picture, eye, 1600 * x, 900 * y);
+        await display.draw(picture, eye, header(1600 * x, 900 * y));
         if (display.overscan.x === before.x && display.overscan.y === before.y) continue;
         before = display.overscan;
         changes.push({ refresh, ...before });
@@ -162,12 +209,12 @@ describe('the display', () => {
   it('does not warp where that is off, or cannot be', async () => {
     display.mode = 'off';
     look(0.05);
-    await display.draw(picture, at(0), 640, 360);
+    await display.draw(picture, at(0), header(640, 360));
     look(0.06);
     expect([drawn, redrawn, refresh]).toEqual([[undefined], [], []]);
     display = make(false);
     look(0.05);
-    await display.draw(picture, at(0), 640, 360);
+    await display.draw(picture, at(0), header(640, 360));
     expect(drawn).toEqual([undefined, undefined]);
     expect(display.warps).toBe(false);
   });

@@ -94,8 +94,35 @@ TEST(Wire, WritesTheGoldenFrame) {
   ticket.render = {rendered - 20ms, rendered};
   ticket.encode = {rendered, rendered + 3ms};
   std::vector<std::byte> packet;
-  wire::append_frame_header(ticket, rendered + 3ms + 50us, packet);
+  wire::append_frame_header(ticket, nullptr, rendered + 3ms + 50us, packet);
   EXPECT_EQ(hex(packet) + "000000016742c01f", golden("server_frame"));
+}
+
+TEST(Wire, FramesBringTheirDepthsWhereTheyHaveSome) {
+  FrameTicket ticket;
+  ticket.render = ticket.encode = StageTime{};
+  const auto header = [&](const PackedDepths* depths) {
+    std::vector<std::byte> packet;
+    wire::append_frame_header(ticket, depths, {}, packet);
+    v1::FrameHeader out;
+    EXPECT_TRUE(out.ParseFromArray(packet.data() + 2, static_cast<int>(packet.size()) - 2));
+    return out;
+  };
+  EXPECT_EQ(header(nullptr).depth_columns(), 0u);
+  const PackedDepths packed{{3, 2}, 0.5f, {std::byte{1}, std::byte{2}}};
+  const v1::FrameHeader with = header(&packed);
+  EXPECT_EQ(with.depth_columns(), 3u);
+  EXPECT_EQ(with.depth_rows(), 2u);
+  EXPECT_EQ(with.depth_scale(), 0.5f);
+  EXPECT_EQ(with.depth_codes(), "\x01\x02");
+}
+
+TEST(Wire, ClientsThatDoNotAskForDepthsGetNone) {
+  v1::ClientMessage message;
+  message.mutable_settings();
+  EXPECT_FALSE(parsed<Settings>(message).depths);
+  message.mutable_settings()->set_depths(true);
+  EXPECT_TRUE(parsed<Settings>(message).depths);
 }
 
 TEST(Wire, EveryServerMessageReadsBack) {

@@ -80,9 +80,9 @@ std::unique_ptr<Encoder> refuse(EncoderKind, const EncoderSettings&) {
   throw std::runtime_error("no session left");
 }
 
-FrameResult drawn(PoolExecutor& executor, const std::shared_ptr<Stream>& stream) {
+FrameResult drawn(PoolExecutor& executor, const std::shared_ptr<Stream>& stream,
+                  FrameJob job = {}) {
   std::promise<FrameResult> done;
-  FrameJob job;
   job.stream = stream;
   executor.submit(std::move(job), [&](FrameResult result) { done.set_value(std::move(result)); });
   return done.get_future().get();
@@ -103,6 +103,44 @@ TEST(PoolExecutor, OtherThreadsEncodeWhenGpusRender) {
   EXPECT_NE(encoded_on, std::thread::id());
   EXPECT_NE(rendered_on, encoded_on);
   EXPECT_LE(result.frame.ticket.render->end, result.frame.ticket.encode->start);
+  executor.close(std::move(stream));
+}
+
+/// Draws depths where they are asked for.
+class DeepView final : public View {
+ public:
+  RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept override {
+    frame = {};
+    if (request.depth_cells.x > 0) frame.depths = {{2, 1}, inverse_depths_};
+    return {};
+  }
+  [[nodiscard]] std::size_t memory_bytes() const override { return 0; }
+
+ private:
+  const std::vector<float> inverse_depths_{0.5f, 2.0f};
+};
+
+TEST(PoolExecutor, FramesBringTheDepthsOfTheirPicture) {
+  std::thread::id on;
+  PoolExecutor executor(
+      {std::make_shared<ThreadPool>(1), {}},
+      [&](EncoderKind, const EncoderSettings&) { return std::make_unique<WatchedEncoder>(&on); });
+  auto stream = std::make_shared<Stream>();
+  stream->view = std::make_unique<DeepView>();
+  const auto depths_of = [&](int cells, bool refined) {
+    FrameJob job;
+    job.request.depth_cells = glm::ivec2(cells);
+    job.ticket.refined = refined;
+    return drawn(executor, stream, std::move(job)).frame.depths;
+  };
+  EXPECT_EQ(depths_of(0, false), nullptr);
+  const auto drawn_once = depths_of(2, false);
+  ASSERT_NE(drawn_once, nullptr);
+  EXPECT_EQ(drawn_once->cells, glm::ivec2(2, 1));
+  EXPECT_FLOAT_EQ(drawn_once->scale, 2.0f / (255.0f * 255.0f));
+  EXPECT_EQ(depths_of(2, true), drawn_once) << "a refined picture is the same one";
+  EXPECT_EQ(depths_of(0, false), nullptr);
+  EXPECT_EQ(depths_of(0, true), nullptr);
   executor.close(std::move(stream));
 }
 

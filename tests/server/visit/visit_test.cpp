@@ -81,6 +81,26 @@ TEST_F(VisitTest, ReportsStatisticsWhileFramesFlow) {
   EXPECT_FLOAT_EQ(std::get<Stats>(host.said.back()).fps, 1.0f);
 }
 
+TEST_F(VisitTest, OrdersDepthsForClientsThatWantThem) {
+  greet();
+  pose(1, 0.0f);
+  EXPECT_EQ(run_frame().request.depth_cells, glm::ivec2(0));
+  Settings settings;
+  settings.depths = true;
+  session.on_message(settings, now);
+  now += 1s;
+  pose(2, 0.1f);
+  const FrameOrder order = run_frame();
+  EXPECT_EQ(order.request.depth_cells, depth_cells_of(order.ticket.size_px));
+  PoseSample parallel;
+  parallel.pose_id = 3;
+  parallel.fov_y_rad = 1.0f;
+  parallel.view_height = 4.0f;
+  now += 1s;
+  session.on_message(parallel, now);
+  EXPECT_EQ(run_frame().request.depth_cells, glm::ivec2(0)) << "moved without depths";
+}
+
 TEST_F(VisitTest, WarnsAnewAfterEverySignOfLifeAndThenReleases) {
   greet();
   const std::function<void()> signs_of_life[] = {

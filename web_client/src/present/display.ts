@@ -2,7 +2,8 @@
 // display.
 import { half_height, type CameraSample, type Eye } from '../camera/eye';
 import type { Picture } from '../decode/picture';
-import type { Pixels, Placing, Presenter } from './presenter';
+import type { FrameHeader } from '../wire/wire';
+import type { Depths, Pixels, Placing, Presenter } from './presenter';
 import { TurnForecast } from './turn_forecast';
 import { can_show, reach, uncovered_share, warp_matrix, type Matrix3, type Sides } from './warp';
 import { WarpPolicy, type WarpMode, type WarpState } from './warp_policy';
@@ -27,6 +28,7 @@ interface Size {
 
 interface Shown extends Size {
   readonly eye: Eye;
+  readonly depths: Depths | undefined;
 }
 
 const no_motion_rad = 1e-6;
@@ -39,6 +41,7 @@ export class Display {
   private picture_: Shown | undefined;
   private view_: Eye | undefined;
   private redraw_due_ = false;
+  private depth_part_: typeof import('./depth_mesh') | undefined;
 
   constructor(
     private readonly presenter_: Presenter,
@@ -58,6 +61,16 @@ export class Display {
   set may_overscan(may: boolean) {
     this.policy_.may_overscan = may;
     this.env_.overscan_changed();
+  }
+
+  /** Warps by the depths of pictures from now on. */
+  set depth_part(part: typeof import('./depth_mesh')) {
+    this.depth_part_ = part;
+    this.env_.overscan_changed();
+  }
+
+  get wants_depths(): boolean {
+    return this.warps && this.depth_part_ !== undefined;
   }
 
   get warps(): boolean {
@@ -90,8 +103,10 @@ export class Display {
     this.redraw_soon();
   }
 
-  async draw(picture: Picture, eye: Eye, width_px: number, height_px: number): Promise<void> {
-    this.picture_ = { eye, width_px, height_px };
+  async draw(picture: Picture, eye: Eye, header: FrameHeader): Promise<void> {
+    const { widthPx: width_px, heightPx: height_px } = header;
+    const depths = this.depth_part_?.unpack_depths(header);
+    this.picture_ = { eye, width_px, height_px, depths };
     const placing = this.placing();
     const begin_us = this.env_.now_us();
     await this.presenter_.draw(picture, placing);
@@ -102,9 +117,7 @@ export class Display {
   read(): (Pixels & { readonly view: ShownView }) | undefined {
     const { picture_: picture, view_: view } = this;
     if (!picture || !view) return undefined;
-    const uncovered = uncovered_share(
-      this.matrix(picture, view, this.camera_?.distance ?? Infinity),
-    );
+    const uncovered = uncovered_share(this.matrix(picture, view));
     return { ...this.presenter_.read(), view: { ...view, uncovered } };
   }
 
@@ -130,15 +143,25 @@ export class Display {
     const { picture_: picture, camera_: camera } = this;
     if (!picture || !camera || !this.policy_.active) return undefined;
     if (!can_show(picture.eye, camera.eye)) return undefined;
-    const matrix = this.matrix(picture, camera.eye, camera.distance);
+    const matrix = this.matrix(picture, camera.eye);
     // After a jump the view sees almost nothing of the picture, which is then better left as it is.
     const { x, y } = reach(matrix);
     if (Math.max(x, y) > farthest_reach) return undefined;
     const height_px = Math.round(picture.height_px / this.overscan.y);
-    return { matrix, width_px: Math.round(height_px * this.aspect), height_px };
+    const surface =
+      picture.depths &&
+      this.depth_part_?.depth_surface(
+        picture.depths,
+        picture.eye,
+        camera.eye,
+        picture.width_px / picture.height_px,
+        this.aspect,
+      );
+    return { matrix, surface, width_px: Math.round(height_px * this.aspect), height_px };
   }
 
-  private matrix({ eye, width_px, height_px }: Shown, view: Eye, distance: number): Matrix3 {
+  private matrix({ eye, width_px, height_px, depths }: Shown, view: Eye): Matrix3 {
+    const distance = (depths ?? this.camera_)?.distance ?? Infinity;
     return warp_matrix(eye, view, width_px / height_px, distance, this.aspect);
   }
 

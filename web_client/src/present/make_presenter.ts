@@ -13,7 +13,7 @@ export function make_presenter(
   wanted: PresenterChoice,
   emptied: () => void,
 ): Presenter {
-  const attributes: WebGLContextAttributes = { alpha: false, antialias: false, depth: false };
+  const attributes: WebGLContextAttributes = { alpha: false, antialias: false };
   if (wanted === 'webgl2' || (wanted === 'auto' && has_hardware_webgl2())) {
     const gl = canvas.getContext('webgl2', attributes);
     if (gl) return new WebGl2Presenter(canvas, gl, emptied);

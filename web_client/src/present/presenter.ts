@@ -8,10 +8,30 @@ export interface Pixels {
   readonly rgba: Uint8ClampedArray<ArrayBuffer>;
 }
 
+/** The depth grid of a picture. */
+export interface Depths {
+  readonly columns: number;
+  readonly rows: number;
+  /** By rows from the top, 1 / world units. */
+  readonly inverse_depths: Float32Array;
+  /** Of the plane that stands for all of the picture where one is enough. */
+  readonly distance: number;
+  /** The largest inverse depth. */
+  readonly nearest: number;
+}
+
+/** A picture in the view that is not plane. */
+export interface Surface {
+  /** Draws the texture that is bound. */
+  draw(gl: WebGL2RenderingContext): void;
+}
+
 /** Places a picture in the view. A picture without a placing fills the view as it is. */
 export interface Placing {
   /** From points of the view to points of the picture. */
   readonly matrix: Matrix3;
+  /** Undefined: the matrix places it. */
+  readonly surface?: Surface | undefined;
   /** Size of the canvas. */
   readonly width_px: number;
   readonly height_px: number;

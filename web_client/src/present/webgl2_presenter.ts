@@ -30,7 +30,9 @@ export class WebGl2Presenter implements Presenter {
   readonly kind = 'webgl2';
   readonly can_warp = true;
   readonly most_px: number;
+  private program_: WebGLProgram | null = null;
   private matrix_location_: WebGLUniformLocation | null = null;
+  private placing_: Placing | undefined; // of the last drawing
 
   constructor(
     private readonly canvas_: OffscreenCanvas,
@@ -55,13 +57,17 @@ export class WebGl2Presenter implements Presenter {
     return Promise.resolve();
   }
 
-  redraw({ matrix, width_px, height_px }: Placing): void {
+  redraw(placing: Placing): void {
     const gl = this.gl_;
+    const { matrix, surface, width_px, height_px } = placing;
+    this.placing_ = placing;
     if (this.canvas_.width !== width_px || this.canvas_.height !== height_px) {
       this.canvas_.width = width_px;
       this.canvas_.height = height_px;
       gl.viewport(0, 0, width_px, height_px);
     }
+    if (surface) return surface.draw(gl);
+    gl.useProgram(this.program_);
     gl.uniformMatrix3fv(this.matrix_location_, false, matrix);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
@@ -70,7 +76,7 @@ export class WebGl2Presenter implements Presenter {
     const gl = this.gl_;
     const { width, height } = this.canvas_;
     // The browser discards the drawing buffer after it is shown, so the texture is drawn again.
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    if (this.placing_) this.redraw(this.placing_);
     const bottom_up = new Uint8Array(width * height * 4);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bottom_up);
     const rgba = new Uint8ClampedArray(bottom_up.length);
@@ -99,9 +105,8 @@ export class WebGl2Presenter implements Presenter {
     if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
       throw new Error(`presenter shader: ${gl.getProgramInfoLog(program) ?? ''}`);
     }
-    gl.useProgram(program);
+    this.program_ = program;
     this.matrix_location_ = gl.getUniformLocation(program, 'picture_from_view');
-    gl.uniformMatrix3fv(this.matrix_location_, false, unmoved);
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
     for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) {
       gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);

@@ -101,6 +101,15 @@ class Client {
     this.session_ = this.make_session(start);
     if (start.watch) this.session_.keep({ case: 'follow', value: { watch: start.watch } });
     this.session_.start();
+    if (this.presenter_.can_warp) this.load_depth_part();
+  }
+
+  /** Pictures are warped without it until then. */
+  private load_depth_part(): void {
+    import('../present/depth_mesh').then(
+      (part) => (this.display_.depth_part = part),
+      (error: unknown) => console.warn('no warping by depths', error),
+    );
   }
 
   handle(message: Exclude<ToWorker, Start>): void {
@@ -236,8 +245,7 @@ class Client {
         timers: browser_timers,
         make_decoder: (config, failures, events) => this.make_decoder(config, failures, events),
         on_refresh,
-        draw: (picture, header) =>
-          this.display_.draw(picture, eye_of_frame(header), header.widthPx, header.heightPx),
+        draw: (picture, header) => this.display_.draw(picture, eye_of_frame(header), header),
       },
       {
         ack: (ack) => this.session_.send({ case: 'ack', value: ack }),
@@ -355,7 +363,9 @@ class Client {
   }
 
   private frame_sizes(): SettingsInit {
-    return frame_sizes(this.view_, this.quality_, this.display_.overscan, this.presenter_.most_px);
+    const { overscan, wants_depths } = this.display_;
+    const sizes = frame_sizes(this.view_, this.quality_, overscan, this.presenter_.most_px);
+    return { ...sizes, depths: wants_depths };
   }
 
   private widened(eye: Eye): Eye {
