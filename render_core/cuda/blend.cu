@@ -178,15 +178,6 @@ struct Waiting {
 /// coefficients of such splats, but not of those far away.
 constexpr float most_at_origin = 128.0f;
 
-/// The halves that the circle around a splat may meet, a bit each. `x`, `y`: its centre, px from
-/// the part's origin.
-__device__ unsigned halves_met(float radius_px, float x, float y) {
-  constexpr float middle = 0.5f * part_side_px;
-  static_assert(halves == 2 && 2 * block_height_px == part_side_px);
-  if (fabsf(x) > radius_px + middle || fabsf(y) > radius_px + middle) return 0;
-  return (y <= radius_px ? 1u : 0u) | (y >= -radius_px ? 2u : 0u);
-}
-
 /// Stages the splats of a group for each unfinished half that they reach. `live`: those halves'
 /// blocks.
 template <bool loose>
@@ -201,7 +192,7 @@ __device__ void stage(WarpScratch& scratch, const PartPixels& pixels, const Grou
     const float x = record.centre_px.x - pixels.origin_x();
     const float y = record.centre_px.y - pixels.origin_y();
     const auto field = math::exponent_field<float>(record.whitening, {x, y}, record.log2_opacity);
-    const unsigned met = loose ? halves_met(__half2float(record.colour.radius_px), x, y) : ~0u;
+    const unsigned met = loose ? halves_met(__half2float(record.colour.half_side_px), x, y) : ~0u;
     splat[i] = staged_splat(field, reinterpret_cast<const uint2&>(record.colour));
     // With a window, a list has splats that reach nothing now, or are far from here.
     const bool near = math::reach_of(record.log2_opacity) >= 0.0f &&
@@ -279,6 +270,14 @@ __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t
   }
 }
 
+/// Of the part's unfinished pixels: nothing behind shows in the finished ones.
+__device__ float largest_transmittance(const States& states) {
+  float largest = 0.0f;
+#pragma unroll
+  for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
+  return __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
+}
+
 /// Marks finished pixels by the sign, as in math::PixelState.
 __device__ float finished_by_sign(float transmittance, float least) {
   return transmittance >= least ? transmittance : -transmittance;
@@ -341,8 +340,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   const float least = p.finish.transmittance;
   unsigned long long pairs = 0;
   const auto behind_finished = [&] {
-    // The limit is halved, so that rounding cannot make the composite use a slice that was not
-    // blended.
+    // Halved, so that rounding cannot make the composite use a slice that was not blended.
     return task.slice > 0 && transmittance_before(p, slice, task.slice, part) < 0.5f * least;
   };
   if (behind_finished()) return;  // the composite will not use this part of the slice
@@ -383,10 +381,7 @@ __device__ void blend_part(const BlendParams& p, WarpScratch& scratch, std::uint
   gather_states(scratch, half, least, states);
   store(p, task, slice, pixels, states);
 
-  float largest = 0.0f;  // of unfinished pixels: nothing behind shows in the finished ones
-#pragma unroll
-  for (int i = 0; i < pixels_per_lane; ++i) largest = fmaxf(largest, states[i].transmittance);
-  largest = __uint_as_float(__reduce_max_sync(~0u, __float_as_uint(largest)));
+  const float largest = largest_transmittance(states);
   const std::uint32_t looked_at = groups.taken();
   const bool finished = largest <= 0.0f && looked_at > task.first;
   const bool ends = p.ends.depth != nullptr && task.slices == 1;

@@ -68,6 +68,15 @@ __device__ inline StagedSplat staged_splat(const math::ExponentField<float>& f, 
            split_pair(-2.0f * f.xx * f.xy, -(f.xy * f.xy + f.yy * f.yy)), colour}};
 }
 
+/// The halves that the square around a splat meets, a bit each. `x`, `y`: its centre, px from
+/// the part's origin.
+__device__ inline unsigned halves_met(float half_side_px, float x, float y) {
+  constexpr float middle = 0.5f * part_side_px;
+  static_assert(halves == 2 && 2 * block_height_px == part_side_px);
+  if (fabsf(x) > half_side_px + middle || fabsf(y) > half_side_px + middle) return 0;
+  return (y <= half_side_px ? 1u : 0u) | (y >= -half_side_px ? 2u : 0u);
+}
+
 /// Splats of a half part in order, in a ring of three rounds. Lanes read splats a quarter apart.
 /// Gaps, and half a row of banks between the halves of a splat, spread the reads over all banks.
 class StagedHalf {

@@ -7,9 +7,7 @@
 #include "render_core/cuda/cuda_view.cuh"
 #include "render_core/cuda/frame_output.cuh"
 #include "render_core/cuda/group_grid.h"
-#include "render_core/cuda/list_repair.cuh"
 #include "render_core/cuda/occlusion.cuh"
-#include "render_core/cuda/project.cuh"
 #include "render_core/cuda/split.cuh"
 
 namespace catgs::cuda {
@@ -26,6 +24,8 @@ int processors_of(int device) {
 std::uint32_t most_gaussians(const SceneArrays& scene) {
   return std::min(scene.count, scene.frame_clusters * std::uint32_t{cluster_size});
 }
+
+glm::ivec2 corner_of(const FrameShape& shape) { return {shape.left_px, shape.top_px}; }
 
 Finish finish_of(Pipeline pipeline) {
   if (pipeline == Pipeline::catgs)
@@ -44,6 +44,7 @@ CudaView::CudaView(std::shared_ptr<const DeviceScene> scene, int device,
       driver_(settings_, FrameDriver::CatgsWindows::some),
       room_(most_gaussians(scene_->arrays()), settings.max_list_entries, settings.split_tasks),
       builder_(memory_, processors_),
+      sub_frames_(memory_, settings.pipeline == Pipeline::catgs),
       blend_warps_(blend_warps(processors_)) {
   if (scene_->tree() != nullptr) paged_.emplace(*scene_->tree(), settings);
   // The memory that does not depend on the image is the largest part of a small scene's View. A
@@ -83,7 +84,7 @@ void CudaView::forget_frames() {
 
 void CudaView::set_shape(glm::ivec2 size_px, const FramePlan& plan, int tile_side) {
   if (shape_.width_px != size_px.x || shape_.height_px != size_px.y) forget_frames();
-  set_grid(shape_, size_px, plan, tile_side, follows() ? grid_margin_px : 0);
+  set_grid(shape_, size_px, plan, tile_side, sub_frames_.follows() ? grid_margin_px : 0);
   const FrameSizes room = room_.sizes();
   shape_.visible_bound = room.visible;
   shape_.list_bound = room.list_entries;
@@ -93,7 +94,8 @@ void CudaView::set_shape(glm::ivec2 size_px, const FramePlan& plan, int tile_sid
 /// Reserves memory for the frame's shape. Where lists need more memory, `headroom` adds some, so
 /// that they do not need more again and again. Throws CudaError.
 void CudaView::reserve(Headroom headroom) {
-  FrameShape roomy = follows() && windows_ ? with_largest_grid(shape_) : shape_;
+  FrameShape roomy =
+      sub_frames_.follows() && sub_frames_.wants_room() ? with_largest_grid(shape_) : shape_;
   if (headroom == Headroom::some && !memory_.holds_lists(shape_)) {
     const FrameSizes most = room_.limits();
     roomy.visible_bound = std::min(most.visible, shape_.visible_bound + shape_.visible_bound / 4);
@@ -103,7 +105,7 @@ void CudaView::reserve(Headroom headroom) {
                        .scene = scene_->arrays(),
                        .in_pages = paged_.has_value(),
                        .settings = settings_,
-                       .windows = windows_})) {
+                       .windows = sub_frames_.wants_room()})) {
     reach_of_.reset();
     ends_of_.reset();
   }
@@ -113,7 +115,7 @@ void CudaView::reserve(Headroom headroom) {
 /// gives up the headroom, then slices, then the farther part of the lists.
 void CudaView::make_room(glm::ivec2 size_px, const FramePlan& plan) {
   const FrameRoom wanted = room_;
-  windows_ = windows_ || plan.window > 0;
+  sub_frames_.want_room(plan);
   Headroom headroom = Headroom::some;
   for (;;) {
     set_shape(size_px, plan, tile_side_px);
@@ -145,13 +147,12 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
   for (;;) {
     make_room(request.camera.size_px, plan);
     ListRequest listed(request.camera, plan, settings_.speculation,
-                       follows() ? std::optional(corner_px()) : std::nullopt);
+                       sub_frames_.follows() ? std::optional(corner_of(shape_)) : std::nullopt);
     times_.begin(stream_.get());
     listed.scene = scene_arrays();
     if (paged_) listed.cut = cut_tree(request, plan);
     listed.occlusion = want_occlusion(listed, plan);
-    group_ = {
-        .loose = follows() && plan.window > 0, .corner_px = corner_px(), .slack = listed.slack};
+    sub_frames_.begin_group(plan, shape_, listed.slack);
     list_tiles(listed);
     split(FrameKind::key);
     times_.end(Stage::sort, stream_.get());
@@ -165,8 +166,9 @@ void CudaView::draw_key(const FrameRequest& request, const FramePlan& plan) {
 
 /// The ends of parts are those of the frame that was drawn.
 void CudaView::note_ends(const Camera& camera) {
-  if (follows())
-    ends_of_ = {.camera = in_grid(make_camera_pair(camera), corner_px()).single, .shape = shape_};
+  if (sub_frames_.follows())
+    ends_of_ = {.camera = in_grid(make_camera_pair(camera), corner_of(shape_)).single,
+                .shape = shape_};
 }
 
 /// The scene, and the part of each cluster that is drawn.
@@ -227,63 +229,19 @@ void CudaView::list_tiles(const ListRequest& request) {
 /// Draws from the lists of the group. False where they do not hold.
 bool CudaView::draw_sub(const FrameRequest& request, const FramePlan& plan) {
   const cudaStream_t stream = stream_.get();
-  const glm::ivec2 corner = cuda::corner_px(group_.corner_px, plan);
-  shape_.left_px = corner.x;
-  shape_.top_px = corner.y;
+  sub_frames_.place(plan, shape_);
   times_.begin(stream);
-  project_group(request.camera);
+  sub_frames_.project(scene_arrays(), request.camera, shape_,
+                      speculation_min_depth(settings_.speculation, request.camera.near_z), stream);
   times_.end(Stage::project, stream);
   times_.end(Stage::bin, stream);
-  if (follows() && !lists_hold()) return false;
+  if (!sub_frames_.lists_hold(shape_, reach_of_.has_value(), stream)) return false;
   split(FrameKind::sub);
   times_.end(Stage::sort, stream);
   blend(request);
   deliver();
   note_ends(request.camera);
   return true;
-}
-
-/// Projects the Gaussians of the group.
-void CudaView::project_group(const Camera& camera) {
-  const cudaStream_t stream = stream_.get();
-  const ViewMemory& m = memory_;
-  constexpr std::size_t kept = offsetof(FrameCounts, nearness);
-  check(cudaMemsetAsync(reinterpret_cast<std::byte*>(m.counts.get()) + kept, 0,
-                        sizeof(FrameCounts) - kept, stream),
-        "counts");
-  m.list_counts.get()->strays = 0;
-  const CameraPair now = in_grid(make_camera_pair(camera), corner_px());
-  launch_project({.scene = scene_arrays(),
-                  .camera = {.now = now, .end = now.single, .near_z = camera.near_z},
-                  .shape = shape_,
-                  .min_depth = speculation_min_depth(settings_.speculation, camera.near_z),
-                  .counts = m.counts.get(),
-                  .visible = m.visible.get(),
-                  .records = m.records.get(),
-                  .depth_key = m.depth.get(),
-                  .splat_depth = m.splat_depth.get(),
-                  .tile_count = nullptr,
-                  .spans = nullptr,
-                  .path = follows() ? m.path.get() : nullptr,
-                  .slack = group_.slack,
-                  .order = nullptr,
-                  .host_counts = m.list_counts.get()},
-                 Listing::none, stream);
-  check(cudaEventRecord(projected_.get(), stream), "strays");
-}
-
-/// Whether few enough splats have left their lists. Repairs the lists meanwhile.
-bool CudaView::lists_hold() {
-  const ViewMemory& m = memory_;
-  launch_list_repair({.shape = shape_,
-                      .range = m.range.get(),
-                      .reach = reach_of_ ? m.reach.get() : nullptr,
-                      .splat_depth = m.splat_depth.get(),
-                      .shifted = group_.sub_frames++ % 2 == 1,
-                      .entries = m.entries.get()},
-                     stream_.get());
-  check(cudaEventSynchronize(projected_.get()), "strays");
-  return m.list_counts.get()->strays <= most_strays;
 }
 
 void CudaView::draw_vanilla(const FrameRequest& request) {
@@ -363,7 +321,7 @@ void CudaView::blend(const FrameRequest& request) {
                 .finish = finish_of(settings_.pipeline),
                 .reach = m.reach.get(),
                 .counts = m.counts.get(),
-                .loose = group_.loose,
+                .loose = sub_frames_.loose(),
                 .count_pairs = settings_.count_pairs,
                 .warps = blend_warps_},
                stream);
@@ -374,7 +332,7 @@ void CudaView::blend(const FrameRequest& request) {
                     .consumed = m.consumed.get(),
                     .entries = m.entries.get(),
                     .ends = ends,
-                    .loose = group_.loose,
+                    .loose = sub_frames_.loose(),
                     .finish = finish_of(settings_.pipeline),
                     .background = background,
                     .rgb = m.rgb.get(),

@@ -11,6 +11,7 @@
 #include "render_core/cuda/split.cuh"
 #include "render_core/cuda/stage_times.h"
 #include "render_core/cuda/stream.h"
+#include "render_core/cuda/sub_frames.cuh"
 #include "render_core/cuda/vanilla.cuh"
 #include "render_core/cuda/view_memory.cuh"
 #include "render_core/frame/frame_driver.h"
@@ -31,14 +32,6 @@ class CudaView final : public View {
   [[nodiscard]] bool outdated() const override { return paged_ && paged_->outdated(); }
 
  private:
-  /// What sub-frames need to know of their key frame.
-  struct Group {
-    bool loose = false;       // lists are as in BlendParams::loose
-    glm::ivec2 corner_px{0};  // of the key frame's picture in the grid
-    ListSlack slack;
-    unsigned sub_frames = 0;
-  };
-
   void set_shape(glm::ivec2 size_px, const FramePlan& plan, int tile_side);
   void make_room(glm::ivec2 size_px, const FramePlan& plan);
   enum class Headroom { none, some };
@@ -48,8 +41,6 @@ class CudaView final : public View {
   [[nodiscard]] std::optional<FrameView> draw(const FrameRequest& request, const FramePlan& plan);
   void draw_key(const FrameRequest& request, const FramePlan& plan);
   [[nodiscard]] bool draw_sub(const FrameRequest& request, const FramePlan& plan);
-  void project_group(const Camera& camera);
-  [[nodiscard]] bool lists_hold();
   void draw_vanilla(const FrameRequest& request);
   [[nodiscard]] SceneArrays scene_arrays() const;
   [[nodiscard]] TreeCut cut_tree(const FrameRequest& request, const FramePlan& plan);
@@ -60,15 +51,12 @@ class CudaView final : public View {
   void blend(const FrameRequest& request);
   void deliver();
   [[nodiscard]] FrameView finished(FrameKind kind, float near_z);
-  [[nodiscard]] glm::ivec2 corner_px() const { return {shape_.left_px, shape_.top_px}; }
-  [[nodiscard]] bool follows() const { return settings_.pipeline == Pipeline::catgs; }
 
   std::shared_ptr<const DeviceScene> scene_;
   int device_;
   int processors_;
   ViewSettings settings_;
   Stream stream_;
-  Event projected_{cudaEventDisableTiming};                          // strays are counted
   Event delivered_{cudaEventBlockingSync | cudaEventDisableTiming};  // the frame has arrived
   StageTimes times_;
   FrameDriver driver_;
@@ -77,6 +65,7 @@ class CudaView final : public View {
   FrameRoom room_;
   ViewMemory memory_;
   ListBuilder builder_;
+  SubFrames sub_frames_;
   VanillaPipeline vanilla_;
   DepthCells depths_;
   int blend_warps_;
@@ -84,10 +73,7 @@ class CudaView final : public View {
   // What memory_ holds of the last frame.
   std::optional<FrameShape> reach_of_;  // whose reach is known
   std::optional<LastPicture> ends_of_;  // whose part_ends are known
-  bool windows_ = false;                // rows of windows have room
   float mean_inverse_depth_ = 0.0f;
-
-  Group group_;
 };
 
 }  // namespace catgs::cuda

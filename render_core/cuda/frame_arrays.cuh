@@ -9,12 +9,12 @@
 
 namespace catgs::cuda {
 
-/// A splat's colour, and the radius of a circle that holds it, px. The colour's rounding alone
+/// A splat's colour, and half the side of the square around it, px. The colour's rounding alone
 /// leaves 77 dB.
 struct __align__(8) PackedColour {
   __half2 red_green;
   __half blue;
-  __half radius_px;  // rounded up
+  __half half_side_px;  // rounded up
 };
 
 /// The fields of one projected Gaussian that blending needs: one 32-byte sector.

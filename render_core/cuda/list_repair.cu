@@ -52,7 +52,7 @@ __global__ void __launch_bounds__(block_size) repair_kernel(const ListRepairPara
   if (p.reach != nullptr) {
     const std::uint32_t reach = p.reach[tile];
     // As far as the tile may look now.
-    last = min(last, range.x + reach + reach / 4 + 2 * run);
+    if (reach < range.y - range.x) last = min(last, range.x + reach + reach / 4 + 2 * run);
   }
   const std::uint32_t start = range.x + (p.shifted ? warp_size : 0);
   const std::uint32_t warp = blockIdx.x % blocks_per_tile * warps + threadIdx.x / warp_size;

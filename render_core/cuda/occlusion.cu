@@ -13,7 +13,7 @@ __device__ float deepest_end(const OcclusionParams& p, float x_px, float y_px) {
   const int right = (last.left_px + last.width_px - 1) / part_side_px;
   const int bottom = (last.top_px + last.height_px - 1) / part_side_px;
   const float x = floorf(x_px / part_side_px), y = floorf(y_px / part_side_px);
-  if (!(x >= static_cast<float>(left) && y >= static_cast<float>(top) &&
+  if (!(x_px >= static_cast<float>(last.left_px) && y_px >= static_cast<float>(last.top_px) &&
         x <= static_cast<float>(right) && y <= static_cast<float>(bottom)))
     return INFINITY;
   float deepest = 0.0f;

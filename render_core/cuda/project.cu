@@ -58,7 +58,7 @@ __global__ void __launch_bounds__(block_size) project_kernel(const ProjectParams
   const math::CameraModel<float>& now = p.camera.now.single;
   const PackedColour colour =
       pack(shade(sh, p.scene.sh_degree, math::view_direction<float>(now.eye, centre.mean)),
-           splat.radius_px);
+           splat.half_side_px);
   p.records[v] = {splat.centre_px, splat.whitening, splat.log2_opacity, colour};
   p.depth_key[v] = depth_key(splat.depth, p.camera.near_z);
   if (p.splat_depth != nullptr) p.splat_depth[v] = splat.depth;

@@ -82,11 +82,11 @@ __device__ inline math::Vec3<float> shade(const ShCoefficients& sh, int degree,
 }
 
 /// What is too large for a half is clamped, because infinity times a weight of zero is NaN. No
-/// picture is as large as that radius.
-__device__ inline PackedColour pack(const math::Vec3<float>& colour, float radius_px) {
+/// picture is as large.
+__device__ inline PackedColour pack(const math::Vec3<float>& colour, float half_side_px) {
   constexpr float most = 65504.0f;
   return {__floats2half2_rn(fminf(colour.x, most), fminf(colour.y, most)),
-          __float2half_rn(fminf(colour.z, most)), __float2half_ru(fminf(radius_px, most))};
+          __float2half_rn(fminf(colour.z, most)), __float2half_ru(fminf(half_side_px, most))};
 }
 
 }  // namespace catgs::cuda

@@ -43,7 +43,7 @@ constexpr float never = -1e30f;
 struct Splat {
   float2 centre_px = {0.0f, 0.0f};
   float2 low_px = {0.0f, 0.0f}, high_px = {0.0f, 0.0f};  // box around it or its path, if in view
-  float radius_px = 0.0f;                                // of a circle around it, if in view
+  float half_side_px = 0.0f;                             // of the square around it, if in view
   math::Whitening<float> whitening = {1.0f, 0.0f, 1.0f};
   float log2_opacity = never;
   float depth = 0.0f;
@@ -95,7 +95,7 @@ __device__ Splat make_splat(const SceneArrays& scene, const FrameCameras& camera
   out.centre_px = make_float2(s.shape.centre_px.x, s.shape.centre_px.y);
   out.low_px = make_float2(x - wide, y - high);
   out.high_px = make_float2(x + wide, y + high);
-  out.radius_px = fmaxf(half.x, half.y);
+  out.half_side_px = fmaxf(half.x, half.y);
   out.whitening = math::whitening(s.shape);
   if (in_front) out.log2_opacity = log2_opacity;
   out.path = {s.displacement.x,    s.displacement.y,    s.outline,

@@ -147,6 +147,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
     atomicMax(&p.counts->list_max, longest);
   }
   __syncthreads();
+  const bool drawn = cut.slices > 0;
   const std::uint32_t first = make_room(p, cut, before, all);
   std::uint32_t position[queue_classes];
 #pragma unroll
@@ -161,7 +162,7 @@ __global__ void __launch_bounds__(split_block) split_kernel(const SplitParams p)
   if (!present) return;
 #pragma unroll
   for (int c = 0; c < queue_classes; ++c) position[c] += queued[c];
-  p.reach[t] = 0;
+  p.reach[t] = drawn ? 0 : ~0u;
   p.tile_slices[t] = make_uint2(first, cut.stored());
   write_tasks(p, t, cut, first, position);
 }

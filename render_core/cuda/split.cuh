@@ -7,7 +7,7 @@ namespace catgs::cuda {
 /// How much of each tile's list the View's last frame looked at. Its grid may lie elsewhere in the
 /// picture.
 struct LastReach {
-  const std::uint32_t* reach = nullptr;  // [tiles of the last grid]; null: unknown
+  const std::uint32_t* reach = nullptr;  // [tiles of the last grid]; null: unknown; ~0: of a tile
   int tiles_x = 0, tiles_y = 0;
   int2 from_px = {0, 0};  // of this grid's corner in the last one
 
@@ -41,7 +41,7 @@ struct SplitParams {
   FrameShape shape;
   const uint2* range;  // [tiles]
   LastReach last_reach;
-  std::uint32_t* reach;        // [tiles], set to zero
+  std::uint32_t* reach;        // [tiles], set to 0, or ~0 of tiles that are not drawn
   BlendTask* tasks;            // [task_bound(shape)]
   uint2* tile_slices;          // [tiles], first slice and number of slices; 0: one task
   std::uint32_t* queue;        // [queue_bound(shape)], see FrameCounts

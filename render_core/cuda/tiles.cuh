@@ -25,7 +25,10 @@ struct ListSlack {
   float near_px = 0.0f;  // px times world units: what a wrong position adds at depth 1
   float most_px = 0.0f;
 
-  __device__ float at(float depth) const { return fminf(far_px + near_px / depth, most_px); }
+  /// `depth`: view depth; a splat that comes from behind the camera may be anywhere.
+  __device__ float at(float depth) const {
+    return depth > 0.0f ? fminf(far_px + near_px / depth, most_px) : most_px;
+  }
 };
 
 /// The tiles that an outline (math::Ellipse or math::Trail) reaches: rows first_row…last_row, and

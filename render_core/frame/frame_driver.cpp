@@ -2,7 +2,6 @@
 
 #include <exception>
 #include <numeric>
-#include <utility>
 
 #include "render_core/frame/device_error.h"
 
@@ -35,7 +34,8 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
     std::optional<FrameView> drawn = draw(plan);
     if (!drawn) {
       groups_.forget();
-      refused_ = true;
+      --last_group_.frames;
+      last_group_.refused = true;
       plan = this->plan(request);
       drawn = draw(plan);
     }
@@ -53,6 +53,7 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
     return {};
   } catch (const std::exception& error) {
     groups_.forget();
+    sub_frames_left_ = 0;
     forget();
     return status_of(error);
   }
@@ -73,12 +74,11 @@ FramePlan FrameDriver::plan(const FrameRequest& request) {
 /// long they would last.
 FramePlan FrameDriver::with_window_if_it_pays(const FramePlan& plan, const Camera& camera) {
   if (plan.kind == FrameKind::key) {
-    const bool pays =
-        gain_.begin_group(std::exchange(group_frames_, 0), std::exchange(refused_, false));
-    has_window_ = plan.window > 0 && pays;
+    const bool pays = gain_.begin_group(last_group_);
+    last_group_ = {.window = plan.window > 0 && pays};
   }
-  ++group_frames_;
-  return has_window_ ? plan : FramePlan{.window_end = camera};
+  ++last_group_.frames;
+  return last_group_.window ? plan : FramePlan{.window_end = camera};
 }
 
 void FrameDriver::note_time(const FrameStats& stats) {

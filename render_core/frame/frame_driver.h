@@ -38,11 +38,9 @@ class FrameDriver {
   bool groups_frames_;
   FrameGroups groups_;
   WindowGain gain_;
-  bool has_window_ = false;  // catgs: the present group has its window
-  bool refused_ = false;     // catgs: the last group's lists did not hold
-  int group_frames_ = 0;     // catgs: frames of the present group, drawn with a window or not
-  int sub_frames_left_ = 0;  // of the present window
-  float depth_ = 0.0f;       // of the last frame, as FrameGroups::plan() takes it
+  WindowGain::Group last_group_;  // catgs: the present group until the next one begins
+  int sub_frames_left_ = 0;       // of the present window
+  float depth_ = 0.0f;            // of the last frame, as FrameGroups::plan() takes it
 };
 
 }  // namespace catgs

@@ -35,7 +35,7 @@ void PagedFrame::end(FrameStats& stats) {
   const Watch::Progress progress = watch_->progress();
   stats.missing_pages = progress.missing;
   stats.coarsest_px = progress.coarsest_px;
-  stats.settled = !watch_->waits(tree_.now_s());
+  stats.settled = !watch_->waits(now_s_);
 }
 
 }  // namespace catgs

@@ -83,7 +83,7 @@ inline Camera cropped(const Camera& whole, glm::ivec2 from_px, glm::ivec2 size_p
   return part;
 }
 
-/// The camera whose picture goes on for `margin_px` on all sides.
+/// The camera whose picture is larger by `margin_px` on all sides.
 inline Camera padded(Camera camera, int margin_px) {
   camera.size_px += 2 * margin_px;
   camera.principal_point_px += static_cast<float>(margin_px);

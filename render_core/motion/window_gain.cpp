@@ -1,14 +1,17 @@
 #include "render_core/motion/window_gain.h"
 
+#include <algorithm>
+
 namespace catgs {
 namespace {
 
 constexpr float weight = 0.25f;       // of a new value in a mean
 constexpr float least_gain = 0.03f;   // under this, one kind of frame is as good as the other
 constexpr float refused_cost = 0.3f;  // of a sub-frame that is not blended, in frames
-// Groups of one kind before one of the other. A plain group costs little among windows. A window
-// that does not pay costs more, and plain groups may be single frames.
-constexpr int windows_in_a_row = 32, plain_in_a_row = 256;
+// Among windows, a group without one now and then measures what they save. Windows that do not pay
+// are tried for a group after so many frames, if groups would last so long.
+constexpr int windows_in_a_row = 16, frames_without = 512;
+constexpr float worth_a_try = 1.8f;
 
 }  // namespace
 
@@ -16,9 +19,14 @@ void WindowGain::add(float& mean, float value) {
   mean = mean > 0.0f ? mean + weight * (value - mean) : value;
 }
 
+/// Only frames just before tell what the same view costs without a window. What is seen may change
+/// even between them, so one measurement moves the share a little only.
 void WindowGain::note_key(float ms) {
+  constexpr float most_change = 1.2f;
+  if (plain_ms_ > 0.0f)
+    add(key_share_, std::clamp(ms / plain_ms_, key_share_ / most_change, key_share_ * most_change));
   key_ms_ = ms;
-  if (plain_ms_ > 0.0f) add(key_share_, ms / plain_ms_);
+  plain_ms_ = 0.0f;
 }
 
 /// Measured against the group's key frame, which sees nearly the same.
@@ -26,22 +34,27 @@ void WindowGain::note_sub(float ms) {
   if (key_ms_ > 0.0f) add(sub_share_, ms / key_ms_ * key_share_);
 }
 
-float WindowGain::expected_share() const {
-  return (key_share_ + (frames_ - 1.0f) * sub_share_) / frames_;
+bool WindowGain::pays(float frames) const {
+  return key_share_ + (frames - 1.0f) * sub_share_ < (1.0f - least_gain) * frames;
 }
 
-bool WindowGain::begin_group(int frames, bool refused) {
-  if (frames > 0) add(frames_, static_cast<float>(frames) - (refused ? refused_cost : 0.0f));
-  const bool pays = expected_share() < 1.0f - least_gain;
-  if (pays != windows_) {
-    windows_ = pays;
-    since_other_ = 0;
+bool WindowGain::begin_group(const Group& last) {
+  if (last.frames > 0) {
+    const float frames = static_cast<float>(last.frames) - (last.refused ? refused_cost : 0.0f);
+    add(last.window ? window_frames_ : planned_frames_, frames);
+    wait_frames_ -= last.frames;
   }
-  // A group of one frame tells nothing of sub-frames.
-  const bool tries_other = ++since_other_ > (windows_ ? windows_in_a_row : plain_in_a_row) &&
-                           (windows_ || frames_ > 1.8f);
-  if (tries_other) since_other_ = 0;
-  return windows_ != tries_other;
+  if (!windows_) {
+    if (wait_frames_ > 0 || last.frames == 0) return false;
+    wait_frames_ = frames_without;
+    window_frames_ = planned_frames_;
+    groups_ = 0;
+    windows_ = pays(planned_frames_);
+    return windows_ || planned_frames_ > worth_a_try;
+  }
+  windows_ = pays(window_frames_);
+  if (!windows_) wait_frames_ = frames_without;
+  return windows_ && ++groups_ % windows_in_a_row != 0;
 }
 
 }  // namespace catgs

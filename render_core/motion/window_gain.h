@@ -6,35 +6,34 @@ namespace catgs {
 /// frame without windows does. A key frame with a window costs more than one without, and its
 /// sub-frames cost less. Both shares are measured, and so is the number of frames that groups last.
 /// Not thread-safe.
-///
-/// Every so often, a group is drawn the other way, so that the shares stay those of what the camera
-/// sees now.
 class WindowGain {
  public:
-  /// Call at a key frame. `frames`: what the group before it lasted, or would have lasted if it had
-  /// a window; its key frame included, and 0 for none. `refused`: it ended with a sub-frame that
-  /// was begun for nothing. Whether the group that begins is to have a window.
-  bool begin_group(int frames, bool refused);
+  /// The group that has ended.
+  struct Group {
+    int frames = 0;        // its key frame included; 0: there was none
+    bool window = false;   // it had one. Else it would have lasted so long, as far as poses tell
+    bool refused = false;  // it ended with a sub-frame that was begun for nothing
+  };
+
+  /// Call at a key frame. Whether the group that begins is to have a window.
+  bool begin_group(const Group& last);
 
   /// Times of a frame's stages, ms; each kind of frame tells its own.
-  void note_plain(float ms) { add(plain_ms_, ms); }
+  void note_plain(float ms) { plain_ms_ = ms; }
   void note_key(float ms);
   void note_sub(float ms);
 
-  /// Frames that a group lasts, its key frame included.
-  [[nodiscard]] float expected_frames() const { return frames_; }
-  /// The time of a frame of a group with a window, as a share of that of a frame without.
-  [[nodiscard]] float expected_share() const;
-
  private:
   static void add(float& mean, float value);
+  [[nodiscard]] bool pays(float frames) const;
 
-  float frames_ = 1.0f;
-  float plain_ms_ = 0.0f, key_ms_ = 0.0f;  // means of late; 0: unknown
-  // First guesses, from rooms and cities on one H200.
+  float planned_frames_ = 0.0f, window_frames_ = 0.0f;  // of a group, means; 0: unknown
+  float plain_ms_ = 0.0f, key_ms_ = 0.0f;               // of the last of its kind; 0: used up
+  // Of the time of a frame without windows. First guesses, from rooms and cities on one H200.
   float key_share_ = 1.25f, sub_share_ = 0.73f;
   bool windows_ = false;
-  int since_other_ = 0;  // groups since one was drawn the other way
+  int wait_frames_ = 0;  // before windows are tried again
+  int groups_ = 0;       // with windows, since one was drawn without
 };
 
 }  // namespace catgs

@@ -20,6 +20,10 @@ struct PackedDepths {
   std::vector<std::byte> codes;
 };
 
+/// What a frame's depths take at most, with the cells of depth_cells_of(), in captured rooms and
+/// cities.
+inline constexpr int depth_bits = 9'000;
+
 /// Cells for pictures of this size: about 64x36 of them, and about square.
 glm::ivec2 depth_cells_of(glm::ivec2 size_px);
 

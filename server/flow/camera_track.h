@@ -23,8 +23,7 @@ class CameraTrack {
     forecast_.add({sample.client_time_us, sample.world_from_camera});
     aim_ = sample;
     seen_us_ = sample.client_time_us + ahead.count();
-    if (const auto then = forecast_.at(seen_us_))
-      aim_.world_from_camera = *then;
+    if (const auto then = forecast_.at(seen_us_)) aim_.world_from_camera = *then;
     return true;
   }
   void follow(const PosePath& path) { forecast_.follow(path); }
@@ -46,7 +45,10 @@ class CameraTrack {
     return forecast_.forecast(seen_us_, rate_hz, frames);
   }
   /// Aims at the newest pose itself, because the camera stands still.
-  void aim_at_newest() { aim_ = *newest_; }
+  void aim_at_newest() {
+    aim_ = *newest_;
+    seen_us_ = aim_.client_time_us;
+  }
 
  private:
   CameraForecast forecast_;

@@ -126,8 +126,8 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   order.request.background = background_;
   order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();
   order.request.soon = track_.ahead(pages_ahead);
-  // A still is drawn once, and exactly where the camera is.
-  if (!ticket.still)
+  // A still is drawn once, and exactly where the camera is. Sub-frames do not show pages that come.
+  if (!ticket.still && settled_)
     order.request.forecast = track_.forecast(order.real_fps, following_speculation.initial_window);
 }
 

@@ -199,8 +199,10 @@ FrameOrder Visit::start_frame(TimePoint now) {
   // Only time decides. If credit was missing, the first picture of a pose may already be the still.
   FrameOrder order = stream_.begin_frame(frames_.rests(now), now);
   frames_.start(order, now);
-  // An orthographic picture is moved without them.
-  if (stream_.plan().depths() && order.ticket.view_height == 0.0f)
+  // An orthographic picture is moved without them, and on a slow link the picture needs the bits.
+  constexpr int least_share = 6;
+  const bool has_bits = 1000 * order.bitrate_kbps >= least_share * depth_bits * order.real_fps;
+  if (stream_.plan().depths() && order.ticket.view_height == 0.0f && has_bits)
     order.request.depth_cells = depth_cells_of(order.ticket.size_px);
   return order;
 }

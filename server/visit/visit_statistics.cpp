@@ -40,10 +40,10 @@ std::optional<Stats> VisitStatistics::take(const FlowControl& flow, int sessions
   if (now - second_start_ < 1s) return std::nullopt;
   const float seconds = std::chrono::duration<float>(now - second_start_).count();
   second_start_ = now;
+  if (second_frames_ == 0) return std::nullopt;  // a still picture has the heartbeat instead
   const auto drawn = static_cast<float>(std::exchange(second_drawn_, 0));
   const auto keys = static_cast<float>(std::exchange(second_keys_, 0));
   const auto device_ms = static_cast<float>(1e3 * std::exchange(second_device_s_, 0.0));
-  if (second_frames_ == 0) return std::nullopt;  // a still picture has the heartbeat instead
   Stats stats = std::exchange(stats_, {});
   stats.fps = static_cast<float>(std::exchange(second_frames_, 0)) / seconds;
   stats.bitrate_kbps = static_cast<float>(std::exchange(second_bytes_, 0)) * 8e-3f / seconds;

@@ -107,7 +107,7 @@ TEST_F(CatgsWindows, ViewsOfOneSceneKeepTheirOwn) {
 
 // A room of the city is entered and left through a doorway: a frame of the wall, and what lies
 // behind it.
-TEST_F(CatgsWindows, WhatComesOutBehindADoorIsThereAtOnce) {
+TEST_F(CatgsWindows, ThingsBehindADoorAreThereAtOnce) {
   GaussianCloud cloud = *plate_before_pattern();
   for (int y = -30; y <= 30; ++y)
     for (int x = -60; x <= 60; ++x)

@@ -70,15 +70,29 @@ constexpr ViewSettings catgs{.pipeline = Pipeline::catgs, .speculation = followi
 
 TEST(FrameDriver, CatgsHasWindowsWhileTheySaveTime) {
   Core core(catgs, FrameDriver::CatgsWindows::some);
-  EXPECT_GT(sub_frames_of(core, 90), 70);
+  sub_frames_of(core, 30);
+  EXPECT_GT(sub_frames_of(core, 300), 240);
   core.sub_ms = 1.05f;
   core.key_ms = 1.3f;
-  sub_frames_of(core, 300);
-  EXPECT_LT(sub_frames_of(core, 300), 30);
+  sub_frames_of(core, 3000);
+  EXPECT_LT(sub_frames_of(core, 600), 30);
   core.sub_ms = 0.6f;
   core.key_ms = 1.1f;
-  sub_frames_of(core, 3000);
-  EXPECT_GT(sub_frames_of(core, 300), 200);
+  sub_frames_of(core, 6000);
+  EXPECT_GT(sub_frames_of(core, 300), 240);
+}
+
+TEST(FrameDriver, AHeavierViewKeepsItsWindows) {
+  Core core(catgs, FrameDriver::CatgsWindows::some);
+  sub_frames_of(core, 100);
+  for (float* ms : {&core.plain_ms, &core.key_ms, &core.sub_ms}) *ms *= 3.0f;
+  EXPECT_GT(sub_frames_of(core, 300), 240);
+}
+
+TEST(FrameDriver, WindowsThatNeverHoldAreGivenUp) {
+  Core core(catgs, FrameDriver::CatgsWindows::some);
+  core.refuses = true;
+  EXPECT_LT(sub_frames_of(core, 3000), 120);  // were begun
 }
 
 TEST(FrameDriver, ASubFrameWhoseListsDoNotHoldIsDrawnAsAKeyFrame) {

@@ -34,7 +34,7 @@ export function unpack_depths({
   depthCodes: packed,
 }: DepthFields): Depths | undefined {
   if (!(columns > 0 && rows > 0 && columns <= most_cells && rows <= most_cells)) return undefined;
-  if (!(scale >= 0 && scale < Infinity)) return undefined;
+  if (!(scale >= 0 && Number.isFinite(Math.fround(scale * 255 * 255)))) return undefined;
   const count = columns * rows;
   let codes;
   try {
@@ -172,11 +172,6 @@ class MeshProgram {
     gl.bindVertexArray(null);
   }
 
-  /** False: it went with its context. */
-  get lives(): boolean {
-    return this.gl_.isProgram(this.program_);
-  }
-
   draw({ columns, rows, nearest }: Depths, points: Float32Array): void {
     const gl = this.gl_;
     gl.useProgram(this.program_);
@@ -213,8 +208,14 @@ export function depth_surface(
   const points = mesh_points(depths, picture, view, aspect, view_aspect);
   return {
     draw: (gl) => {
+      if (gl.isContextLost()) return;
       let program = programs.get(gl);
-      if (!program?.lives) programs.set(gl, (program = new MeshProgram(gl)));
+      if (!program) {
+        programs.set(gl, (program = new MeshProgram(gl)));
+        // A program goes with its context.
+        const forget = (): boolean => programs.delete(gl);
+        gl.canvas.addEventListener('webglcontextlost', forget, { once: true });
+      }
       program.draw(depths, points);
     },
   };

@@ -63,7 +63,7 @@ export class WarpPolicy {
     if (x.length < least_samples) return false;
     if (percentile(this.draw_us_.values(now_us), 0.5) > slow_draw_us && this.mode_ === 'auto') {
       this.too_slow_ = true;
-      return this.overscan_ !== none;
+      return true; // nor are depths wanted any more
     }
     return this.choose({ x: percentile(x, 0.9), y: percentile(y, 0.9) }, now_us);
   }

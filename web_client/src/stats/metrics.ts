@@ -36,7 +36,7 @@ export interface StatsSnapshot extends Motion {
   readonly packets_dropped: number; // never sent by the server
   /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
   readonly pages: PagesDrawn | undefined;
-  readonly gpu: GpuUse | undefined; // of the last second; undefined: the server's CPU draws
+  readonly gpu: GpuUse | undefined; // of the last second in which one drew
 }
 
 /** What the server's GPU does for this picture. */
@@ -122,14 +122,12 @@ export class Metrics {
 
   server_said(stats: Stats): void {
     this.packets_dropped_ = stats.droppedPackets;
-    this.gpu_ =
-      stats.deviceMs > 0
-        ? {
-            frame_ms: stats.deviceMs,
-            frames_per_list: stats.framesPerKey,
-            lists_left: stats.windowsCut,
-          }
-        : undefined;
+    if (stats.deviceMs > 0)
+      this.gpu_ = {
+        frame_ms: stats.deviceMs,
+        frames_per_list: stats.framesPerKey,
+        lists_left: stats.windowsCut,
+      };
     const in_pages = stats.nodesDrawn > 0;
     this.pages_ = !in_pages
       ? undefined

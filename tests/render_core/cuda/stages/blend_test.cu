@@ -89,7 +89,8 @@ class BlendStage : public StageTest {
                                              .fills = false,
                                              .count_pairs = false,
                                              .image = &image,
-                                             .ends = {ends.data(), catgs::parts_across}});
+                                             .ends = {ends.data(), catgs::parts_across},
+                                             .depths = {}});
     const float end = *std::ranges::max_element(ends);
     if (std::isinf(end)) return list.size();
     const auto behind = std::ranges::find_if(
