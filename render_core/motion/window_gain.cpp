@@ -19,19 +19,22 @@ void WindowGain::add(float& mean, float value) {
   mean = mean > 0.0f ? mean + weight * (value - mean) : value;
 }
 
-/// Only frames just before tell what the same view costs without a window. What is seen may change
-/// even between them, so one measurement moves the share a little only.
-void WindowGain::note_key(float ms) {
+void WindowGain::measure(float& share, float now) {
   constexpr float most_change = 1.2f;
-  if (plain_ms_ > 0.0f)
-    add(key_share_, std::clamp(ms / plain_ms_, key_share_ / most_change, key_share_ * most_change));
+  add(share, std::clamp(now, share / most_change, share * most_change));
+}
+
+/// Only a frame just before tells what the same view costs without a window.
+void WindowGain::note_key(float ms) {
+  if (plain_ms_ > 0.0f) measure(key_share_, ms / plain_ms_);
   key_ms_ = ms;
   plain_ms_ = 0.0f;
 }
 
-/// Measured against the group's key frame, which sees nearly the same.
+/// The first one is measured against its key frame, which sees nearly the same.
 void WindowGain::note_sub(float ms) {
-  if (key_ms_ > 0.0f) add(sub_share_, ms / key_ms_ * key_share_);
+  if (key_ms_ > 0.0f) measure(sub_share_, ms / key_ms_ * key_share_);
+  key_ms_ = 0.0f;
 }
 
 bool WindowGain::pays(float frames) const {

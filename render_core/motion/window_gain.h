@@ -25,6 +25,8 @@ class WindowGain {
 
  private:
   static void add(float& mean, float value);
+  /// What is seen may change between two frames, so one measurement moves a share by little.
+  static void measure(float& share, float now);
   [[nodiscard]] bool pays(float frames) const;
 
   float planned_frames_ = 0.0f, window_frames_ = 0.0f;  // of a group, means; 0: unknown

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -263,8 +264,8 @@ class FollowingGroup : public ::testing::Test {
 };
 
 TEST_F(FollowingGroup, ATurnMovesTheGridAndLeavesShortTrails) {
-  EXPECT_EQ(first_.window, 8);
-  EXPECT_EQ(first_.end_shift_px, glm::ivec2(-31, 0));  // 1100 tan(1.6 degrees)
+  EXPECT_EQ(first_.window, 5);
+  EXPECT_EQ(first_.end_shift_px, glm::ivec2(-19, 0));  // 1100 tan(1 degree)
   const FramePlan fixed = FrameGroups{SpeculationSettings{.initial_window = 12}}.plan(
       camera_at({}), Forecast{turned(8 * rate_deg, {0, 1, 0}), 8}, depth);
   EXPECT_EQ(fixed.window, 2);
@@ -278,8 +279,15 @@ TEST_F(FollowingGroup, TheGridIsWhereTheCameraReallyIs) {
 }
 
 TEST_F(FollowingGroup, EndsBeyondTheMarginOfTheGrid) {
-  EXPECT_EQ(next(camera_at(turned(-0.3f, {0, 1, 0}))).kind, FrameKind::sub);
-  EXPECT_EQ(next(camera_at(turned(-0.5f, {0, 1, 0}))).kind, FrameKind::key);  // 9.6 px
+  SpeculationSettings settings = following_speculation;
+  settings.max_deviation_px = 50.0f;
+  for (const auto& [degrees, kind] :
+       {std::pair(-0.3f, FrameKind::sub), std::pair(-0.5f, FrameKind::key)}) {  // 9.6 px
+    FrameGroups groups(settings, TileGrid::follows);
+    groups.plan(camera_at({}), Forecast{turned(8 * rate_deg, {0, 1, 0}), 8}, depth);
+    const Camera now = camera_at(turned(degrees, {0, 1, 0}));
+    EXPECT_EQ(groups.plan(now, Forecast{now.world_from_camera, 8}, depth).kind, kind);
+  }
 }
 
 TEST_F(FollowingGroup, EndsWhereParallaxLeavesTheForecast) {
@@ -290,11 +298,13 @@ TEST_F(FollowingGroup, EndsWhereParallaxLeavesTheForecast) {
 }
 
 TEST(FrameGroups, AGridThatFollowsHasABound) {
-  FrameGroups groups(following_speculation, TileGrid::follows);
+  SpeculationSettings settings = following_speculation;
+  settings.max_trail_px = 1e6f;
+  FrameGroups groups(settings, TileGrid::follows);
   const FramePlan plan =
       groups.plan(camera_at({}), Forecast{turned(12, {0, 1, 0}), 12}, 5.0f);  // 234 px
-  EXPECT_GT(plan.window, 0);
-  EXPECT_LE(std::abs(plan.end_shift_px.x), most_travel_px);
+  EXPECT_EQ(plan.window, 4);
+  EXPECT_EQ(plan.end_shift_px, glm::ivec2(-77, 0));  // 1100 tan(4 degrees)
 }
 
 }  // namespace
