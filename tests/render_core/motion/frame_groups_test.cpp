@@ -264,8 +264,8 @@ class FollowingGroup : public ::testing::Test {
 };
 
 TEST_F(FollowingGroup, ATurnMovesTheGridAndLeavesShortTrails) {
-  EXPECT_EQ(first_.window, 5);
-  EXPECT_EQ(first_.end_shift_px, glm::ivec2(-19, 0));  // 1100 tan(1 degree)
+  EXPECT_EQ(first_.window, 4);
+  EXPECT_EQ(first_.end_shift_px, glm::ivec2(-15, 0));  // 1100 tan(0.8 degrees)
   const FramePlan fixed = FrameGroups{SpeculationSettings{.initial_window = 12}}.plan(
       camera_at({}), Forecast{turned(8 * rate_deg, {0, 1, 0}), 8}, depth);
   EXPECT_EQ(fixed.window, 2);
