@@ -62,6 +62,7 @@ void DepthSampler::find_row(int row) {
       const float* const line = parts_.data() + y * stride_;
       found.insert(found.end(), line + columns.begin, line + columns.end);
     }
+    if (found.empty()) continue;  // no cell is without parts
     const auto middle = found.begin() + static_cast<std::ptrdiff_t>(found.size() / 2);
     std::ranges::nth_element(found, middle);
     inverse_depths_[static_cast<std::size_t>(row * cells_.x + column)] = *middle;

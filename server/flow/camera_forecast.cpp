@@ -52,7 +52,8 @@ std::optional<Forecast> CameraForecast::forecast(std::int64_t now_us, double rat
                                                  int frames) const {
   if (!on_path(now_us)) return predictor_.forecast(now_us, rate_hz, frames);
   const double left_s = 1e-6 * static_cast<double>(path_.back().time_us - now_us);
-  const int held = std::min(frames, static_cast<int>(left_s * rate_hz));
+  constexpr double rounding = 1e-6;
+  const int held = std::min(frames, static_cast<int>(left_s * rate_hz + rounding));
   return Forecast{interpolate(path_, now_us + std::llround(1e6 * held / rate_hz)), held};
 }
 

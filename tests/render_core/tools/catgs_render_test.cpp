@@ -208,8 +208,9 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames(still + "--pipeline paper --window -1 --out x"), "--window: is out of range");
   expect(frames("--trace x --duration 2 --out x"), "--duration: has no effect on a recorded trace");
   expect(frames("--trace x --seed 1 --out x"), "--seed: has no effect on a recorded trace");
-  expect(frames(still + "--pipeline catgs --max-deviation-px 1 --out x"),
-         "--max-deviation-px: has no effect on the catgs pipeline (use --pipeline paper)");
+  expect(
+      frames(still + "--pipeline vanilla --max-deviation-px 1 --out x"),
+      "--max-deviation-px: has no effect on the vanilla pipeline (use --pipeline paper or catgs)");
   expect(run(fmt::format("bench {} --script still --frames :2 --warmup 100000000000", scene())),
          "--warmup: 100000000000 frames of a path of 2");
   expect(frames(still + "--near inf --out x"), "--near: inf is not a positive, finite distance");

@@ -92,9 +92,9 @@ TEST(PipelineOptions, RefuseWhatWouldChangeNothing) {
   refused({.pipeline = "fast"},
           "--pipeline: unknown \"fast\" (one of exact, vanilla, paper, catgs)");
   refused({.pipeline = "paper", .window = 65}, "--window: is out of range");
-  refused({.pipeline = "catgs", .window = 0}, "--window: has no effect on the catgs pipeline");
+  refused({.pipeline = "vanilla", .window = 0}, "--window: has no effect on the vanilla pipeline");
   refused({.window = 4}, "--window: has no effect on the exact pipeline");
-  refused({.pipeline = "catgs", .min_depth = 1.0f}, "--min-depth: has no effect on the catgs");
+  refused({.pipeline = "exact", .min_depth = 1.0f}, "--min-depth: has no effect on the exact");
   refused({.no_colour_cache = true}, "--no-colour-cache: has no effect on the exact pipeline");
   refused({.no_cache = true}, "--no-cache: has no effect");
   refused({.constant_velocity = true}, "--constant-velocity: has no effect");

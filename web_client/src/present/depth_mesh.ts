@@ -172,6 +172,11 @@ class MeshProgram {
     gl.bindVertexArray(null);
   }
 
+  /** False: it went with its context. */
+  get lives(): boolean {
+    return this.gl_.isProgram(this.program_);
+  }
+
   draw({ columns, rows, nearest }: Depths, points: Float32Array): void {
     const gl = this.gl_;
     gl.useProgram(this.program_);
@@ -208,14 +213,8 @@ export function depth_surface(
   const points = mesh_points(depths, picture, view, aspect, view_aspect);
   return {
     draw: (gl) => {
-      if (gl.isContextLost()) return;
       let program = programs.get(gl);
-      if (!program) {
-        programs.set(gl, (program = new MeshProgram(gl)));
-        // A program goes with its context.
-        const forget = (): boolean => programs.delete(gl);
-        gl.canvas.addEventListener('webglcontextlost', forget, { once: true });
-      }
+      if (!program?.lives) programs.set(gl, (program = new MeshProgram(gl)));
       program.draw(depths, points);
     },
   };
