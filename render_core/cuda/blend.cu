@@ -270,7 +270,7 @@ __device__ void store(const BlendParams& p, const BlendTask& task, std::uint32_t
   }
 }
 
-/// Of the part's unfinished pixels: nothing behind shows in the finished ones.
+/// The largest of the part's unfinished pixels: nothing behind shows in the finished ones.
 __device__ float largest_transmittance(const States& states) {
   float largest = 0.0f;
 #pragma unroll

@@ -70,7 +70,7 @@ class CudaView final : public View {
   DepthCells depths_;
   int blend_warps_;
 
-  // What memory_ holds of the last frame.
+  // The contents that memory_ has of the last frame.
   std::optional<FrameShape> reach_of_;  // whose reach is known
   std::optional<LastPicture> ends_of_;  // whose part_ends are known
   float mean_inverse_depth_ = 0.0f;

@@ -15,7 +15,7 @@ struct Occlusion {
   __device__ bool hides(const FrameShape& shape, float2 low_px, float2 high_px, float depth) const;
 };
 
-/// What remains of a frame for occlusion in the next one.
+/// The part of a frame that occlusion needs in the next one.
 struct LastPicture {
   math::CameraModel<float> camera;  // draws into its grid
   FrameShape shape;

@@ -25,7 +25,7 @@ class WindowGain {
 
  private:
   static void add(float& mean, float value);
-  /// What is seen may change between two frames, so one measurement moves a share by little.
+  /// One measurement moves a share by little: the view may change between two frames.
   static void measure(float& share, float now);
   [[nodiscard]] bool pays(float frames) const;
 
