@@ -37,6 +37,7 @@ export interface StatsSnapshot extends Motion {
   /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
   readonly pages: PagesDrawn | undefined;
   readonly gpu: GpuUse | undefined; // of the last second in which one drew
+  readonly headset_hz: number | undefined; // refreshes of the headset that the visitor wears
 }
 
 /** What the server's GPU does for this picture. */
@@ -78,6 +79,8 @@ export class Metrics {
   private packets_dropped_ = 0;
   private pages_: PagesDrawn | undefined;
   private gpu_: GpuUse | undefined;
+  /** Undefined: the visitor wears no headset. */
+  headset_hz: number | undefined;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -155,6 +158,7 @@ export class Metrics {
       packets_dropped: this.packets_dropped_,
       pages: this.pages_,
       gpu: this.gpu_,
+      headset_hz: this.headset_hz,
       last_motion: this.motion((window) => window.newest()),
     };
   }
