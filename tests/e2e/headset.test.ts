@@ -14,6 +14,7 @@ import {
   welcome,
   type FakeServer,
   type Peer,
+  type ServerBody,
   type Script,
 } from './support/fake_server';
 import {
@@ -29,7 +30,7 @@ import {
 } from './support/headset';
 import { artefacts } from './support/paths';
 import { painted_jpeg, stream_of } from './support/painted';
-import { read_png, type Picture } from './support/pictures';
+import { psnr_db, read_png, type Picture } from './support/pictures';
 import { block_shifts, median } from './support/registration';
 import { street_view, street_view_depths } from './support/street';
 
@@ -80,37 +81,37 @@ const settings_of = (peer: Peer) =>
 const poses_of = (peer: Peer) =>
   peer.heard.flatMap(({ case: kind, value }) => (kind === 'pose' ? [value] : []));
 
+const header_of = (peer: Peer, poseId: bigint, poseClientTimeUs: bigint) => ({
+  frameId: BigInt(peer.heard.length),
+  poseId,
+  poseClientTimeUs,
+  renderPose: { position: scene.startPose.position, orientation: { w: 1 } },
+  fovYRad: 1,
+  codec: Codec.MJPEG,
+  idr: true,
+  widthPx: width,
+  heightPx: height,
+});
+
+function show_both_eyes(peer: Peer, poseId: bigint, poseClientTimeUs: bigint): void {
+  const eye = (side: number) => ({ rightOfPose: (side * between_eyes_m) / 2, ...frustum });
+  peer.frame(
+    {
+      ...header_of(peer, poseId, poseClientTimeUs),
+      stereo: { left: eye(-1), right: eye(1) },
+      ...street_view_depths(drawn, 128, 36),
+    },
+    jpeg,
+  );
+}
+
 /** Shows the street to both eyes from where the visit began, whatever the head does: pictures that never come. */
 const late: Script = (peer, body) => {
   if (body.case === 'hello') peer.say(welcome(scene));
   if (body.case !== 'pose') return;
-  const stereo = settings_of(peer).at(-1)?.stereo;
-  const { left, right, up, down } = frustum;
-  const eye = (side: number) => ({
-    rightOfPose: (side * between_eyes_m) / 2,
-    left,
-    right,
-    up,
-    down,
-  });
-  peer.frame(
-    {
-      frameId: BigInt(peer.heard.length),
-      poseId: body.value.poseId,
-      poseClientTimeUs: body.value.clientTimeUs,
-      renderPose: { position: scene.startPose.position, orientation: { w: 1 } },
-      fovYRad: 1,
-      codec: Codec.MJPEG,
-      idr: true,
-      widthPx: width,
-      heightPx: height,
-      ...(stereo && {
-        stereo: { left: eye(-1), right: eye(1) },
-        ...street_view_depths(drawn, 128, 36),
-      }),
-    },
-    jpeg,
-  );
+  if (settings_of(peer).at(-1)?.stereo)
+    show_both_eyes(peer, body.value.poseId, body.value.clientTimeUs);
+  else peer.frame(header_of(peer, body.value.poseId, body.value.clientTimeUs), jpeg);
 };
 
 /** What both eyes see, side by side. */
@@ -186,6 +187,26 @@ describe('a page', () => {
     });
     await page.getByRole('button', { name: 'Enter VR' }).click();
     await page.getByText('The headset did not start.').waitFor();
+  });
+});
+
+describe('a page that watches somebody with a headset', () => {
+  it('shows what their left eye sees', async () => {
+    const server = await start_fake_server((peer, body) => {
+      if (body.case !== 'hello') return;
+      const { value, ...said } = welcome(scene);
+      peer.say({ ...said, value: { ...value, watching: true } } as ServerBody);
+      show_both_eyes(peer, 1n, 0n);
+    });
+    const { page, errors } = await new_page(window_size);
+    await page.goto(server.url);
+    await page.locator('#card').waitFor({ state: 'hidden' });
+    const shot = await page.evaluate(() => window.catgs!.snapshot());
+    expect([shot.width_px, shot.height_px]).toEqual([width / 2, height]);
+    const left = street_view(drawn.slice(0, 1), width / 2, height);
+    const shown = { width: shot.width_px, height: shot.height_px, rgba: shot.rgba };
+    expect(psnr_db(shown, left)).toBeGreaterThan(30);
+    expect(errors).toEqual([]);
   });
 });
 

@@ -41,3 +41,24 @@ export class HeadsetOutput {
     this.shown_(seen_us);
   }
 }
+
+/**
+ * Draws what the left eye sees in a picture of both, for pages without a headset: those that watch somebody with
+ * one, and those whose visitor has just taken it off.
+ */
+export async function draw_left_half(
+  picture: Picture,
+  header: FrameHeader,
+  draw: (picture: Picture, header: FrameHeader) => Promise<void>,
+): Promise<void> {
+  const widthPx = header.widthPx / 2;
+  const { up = 0, down = 0 } = header.stereo?.left ?? {};
+  const left = await createImageBitmap(picture, 0, 0, widthPx, header.heightPx);
+  try {
+    // The depths are those of both eyes.
+    const fovYRad = 2 * Math.atan((down - up) / 2);
+    await draw(left, { ...header, widthPx, fovYRad, depthColumns: 0 });
+  } finally {
+    left.close();
+  }
+}

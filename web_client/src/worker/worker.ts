@@ -220,12 +220,8 @@ class Client {
     say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
   }
 
-  private present({
-    on,
-    name,
-    pings,
-    tells_positions,
-  }: Extract<ToWorker, { kind: 'present' }>): void {
+  private present(message: Extract<ToWorker, { kind: 'present' }>): void {
+    const { on, name, pings, tells_positions } = message;
     // The host's pictures and field of view are also those of participants, who see no warped view.
     this.display_.may_overscan = !on;
     this.session_.keep({
@@ -291,8 +287,13 @@ class Client {
   private async draw(picture: Picture, header: FrameHeader): Promise<number | undefined> {
     const eye = eye_of_frame(header);
     if (this.headset_) return this.headset_.draw(picture, header, this.coordinates_.to_file(eye));
-    // Pictures of both eyes still arrive when the headset is off.
     if (!header.stereo) await this.display_.draw(picture, eye, header);
+    else
+      await (
+        await import('./headset')
+      ).draw_left_half(picture, header, (left, its_header) =>
+        this.display_.draw(left, eye_of_frame(its_header), its_header),
+      );
     return undefined;
   }
 
