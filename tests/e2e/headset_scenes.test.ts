@@ -11,6 +11,7 @@ import {
   in_room,
   pointing,
   press,
+  pull_trigger,
   push_stick,
   put,
   refreshes,
@@ -78,6 +79,13 @@ async function point_at(
   await put(page, hand, pointing([0.2, -1.3, 0.3], there));
 }
 
+/** Holds the trigger until there is time to aim. */
+async function hold(page: Page): Promise<void> {
+  await pull_trigger(page, 1);
+  await page.waitForTimeout(800);
+  await pull_trigger(page, 0);
+}
+
 it('a visitor teleports along the street, and stays at eye height', async () => {
   const { page, errors } = await visit();
   const begin = await pose_of(page);
@@ -91,6 +99,9 @@ it('a visitor teleports along the street, and stays at eye height', async () => 
   expect(there.position[2] - begin.position[2]).toBeGreaterThan(2);
   expect(Math.abs(there.position[1] + eyes_m)).toBeLessThan(0.6);
   await expect.poll(() => seen(page, 'headset-teleported')).toBeGreaterThan(0.5);
+  // The trigger does the same.
+  await hold(page);
+  await expect.poll(async () => distance(await pose_of(page), there)).toBeGreaterThan(2);
   expect(errors).toEqual([]);
 });
 
@@ -119,6 +130,16 @@ it('a visitor goes through a portal, and leaves in the other scene', async () =>
   const scene = (): Promise<string> => page.locator('#scene-name bdi').innerText();
   await expect.poll(scene).toBe('park');
   await expect.poll(() => seen(page, 'headset-park')).toBeGreaterThan(0.3);
+  // Nobody knows a walkable area here: the visitor comes to what they point at.
+  const arrived = await pose_of(page);
+  await put(page, 'right', pointing([0.2, -1.3, 0.3], [0.3, 0, 2.5]));
+  await expect
+    .poll(async () => {
+      await hold(page);
+      return distance(await pose_of(page), arrived);
+    })
+    .toBeGreaterThan(0.1);
+  await seen(page, 'headset-park-teleported');
   await page.evaluate(() => window.emulated!.activeSession!.end());
   expect(errors).toEqual([]);
 });

@@ -120,19 +120,23 @@ export async function push_stick(
   await refreshes(page);
 }
 
-/** Presses the trigger of the right controller, or pinches with that hand, and lets go. */
+/** Of the right controller, or a pinch of that hand: 1 is all the way. */
+export async function pull_trigger(page: Page, value: number, with_hand = false): Promise<void> {
+  await page.evaluate(
+    ([v, hand]) => {
+      const { controllers, hands } = window.emulated!;
+      if (hand) hands.right.updatePinchValue(v);
+      else controllers.right.updateButtonValue('trigger', v);
+    },
+    [value, with_hand] as const,
+  );
+  await refreshes(page);
+}
+
+/** Pulls the trigger, or pinches, and lets go. */
 export async function press(page: Page, with_hand = false): Promise<void> {
-  for (const value of [1, 0]) {
-    await page.evaluate(
-      ([v, hand]) => {
-        const { controllers, hands } = window.emulated!;
-        if (hand) hands.right.updatePinchValue(v);
-        else controllers.right.updateButtonValue('trigger', v);
-      },
-      [value, with_hand] as const,
-    );
-    await refreshes(page);
-  }
+  await pull_trigger(page, 1, with_hand);
+  await pull_trigger(page, 0, with_hand);
 }
 
 /** Where a point of the world is in the room of a visitor whose head is there in both. */

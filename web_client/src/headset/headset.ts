@@ -88,7 +88,10 @@ export class Headset {
     this.pointers_ = new Pointers({
       target: (ray) => this.target(ray),
       aim_begins: () => this.teleport_.begin(),
-      aim_ends: () => this.go_to(this.teleport_.end()),
+      aim_ends: (goes) => {
+        const floor = this.teleport_.end();
+        if (goes) this.go_to(floor);
+      },
       turn: (steps) => this.turn(steps),
     });
     worker.on('picture', (message) => this.take(message));

@@ -16,11 +16,13 @@ interface Actions {
   /** What a ray meets first. */
   target(ray: RoomRay): Target | undefined;
   aim_begins(): void;
-  aim_ends(): void;
+  /** `goes`: the visitor wants to be where they aim. */
+  aim_ends(goes: boolean): void;
   /** Steps to the right. */
   turn(steps: number): void;
 }
 
+const least_hold_ms = 250; // a shorter press that meets nothing is a slip
 const shown_m = 1.2; // of a ray that meets nothing
 
 export class Pointers {
@@ -28,6 +30,7 @@ export class Pointers {
   private rays_: readonly { readonly ray: RoomRay; readonly target: Target | undefined }[] = [];
   private pressed_: { readonly source: XRInputSource; readonly id: string } | undefined;
   private aims_: XRInputSource | undefined;
+  private aims_since_ms_ = 0;
   private push_: readonly [x: number, y: number] = [0, 0];
 
   constructor(private readonly actions_: Actions) {}
@@ -44,7 +47,8 @@ export class Pointers {
       else this.aim(source);
     });
     session.addEventListener('selectend', ({ inputSource: source, frame }) => {
-      if (this.aims_ === source) return this.aim(undefined);
+      if (this.aims_ === source)
+        return this.end_aim(performance.now() - this.aims_since_ms_ >= least_hold_ms);
       if (this.pressed_?.source !== source) return;
       const ray = ray_of(source, frame, space);
       const target = ray && this.actions_.target(ray);
@@ -65,7 +69,7 @@ export class Pointers {
 
   look(frame: XRFrame, space: XRReferenceSpace): void {
     const sources = [...frame.session.inputSources];
-    if (this.aims_ && !sources.includes(this.aims_)) this.aim(undefined);
+    if (this.aims_ && !sources.includes(this.aims_)) this.end_aim(false);
     this.rays_ = sources.flatMap((source) => {
       const ray = source === this.aims_ ? undefined : ray_of(source, frame, space);
       return ray ? [{ ray, target: this.actions_.target(ray) }] : [];
@@ -94,14 +98,18 @@ export class Pointers {
     const { turn, aim } = stick.move(...stick_of(source));
     if (turn !== 0) this.actions_.turn(turn);
     if (aim === 'begins') this.aim(source);
-    else if (aim === 'ends' && this.aims_ === source) this.aim(undefined);
+    else if (aim === 'ends' && this.aims_ === source) this.end_aim(true);
   }
 
-  /** Undefined: nobody aims any more. */
-  private aim(source: XRInputSource | undefined): void {
+  private aim(source: XRInputSource): void {
     this.aims_ = source;
-    if (source) this.actions_.aim_begins();
-    else this.actions_.aim_ends();
+    this.aims_since_ms_ = performance.now();
+    this.actions_.aim_begins();
+  }
+
+  private end_aim(goes: boolean): void {
+    this.aims_ = undefined;
+    this.actions_.aim_ends(goes);
   }
 }
 
