@@ -25,7 +25,9 @@ interface Emulated extends Tracked {
   readonly controllers: Readonly<Record<'left' | 'right', Controller>>;
   readonly hands: Readonly<Record<'left' | 'right', Hand>>;
   primaryInputMode: 'controller' | 'hand';
-  readonly activeSession: { end(): Promise<void> } | undefined;
+  readonly activeSession:
+    | { end(): Promise<void>; requestAnimationFrame(refreshed: () => void): void }
+    | undefined;
   updateVisibilityState(state: 'visible' | 'visible-blurred' | 'hidden'): void;
 }
 

@@ -1,23 +1,39 @@
 // Offers to enter a headset where the browser has one. All else of it loads when somebody does.
 import { load_part } from '../base/load_part';
-import { by_id } from '../page/dom';
+import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Headset, HeadsetParts } from './headset';
 
+type WithXr = Navigator & { readonly xr?: XRSystem };
+
+/**
+ * Asks in a frame that goes again: browsers keep no page for the way back that has looked at navigator.xr.
+ */
+async function has_headset(): Promise<boolean> {
+  const frame = make('iframe', { hidden: true });
+  document.body.append(frame);
+  try {
+    const { xr } = frame.contentWindow?.navigator as WithXr;
+    return (await xr?.isSessionSupported('immersive-vr')) ?? false;
+  } catch {
+    return false; // the page around this one does not allow it
+  } finally {
+    frame.remove();
+  }
+}
+
 export function offer_headset(parts: HeadsetParts): void {
-  const { xr } = navigator as { readonly xr?: XRSystem };
-  if (!xr) return;
+  if (!('xr' in navigator)) return;
   const button = by_id('button-headset', HTMLButtonElement);
   const look = async (): Promise<void> => {
-    const is_there = await xr.isSessionSupported('immersive-vr').catch(() => false);
-    button.hidden = !is_there;
+    button.hidden = !(await has_headset());
   };
-  xr.addEventListener('devicechange', () => void look());
   void look();
+  window.addEventListener('focus', () => void look()); // somebody may have connected one
   let headset: Headset | undefined;
   button.addEventListener('click', () => {
     // At once: browsers allow it for a moment after the press.
-    const asked = xr.requestSession('immersive-vr', {
+    const asked = navigator.xr!.requestSession('immersive-vr', {
       optionalFeatures: ['local-floor', 'hand-tracking'],
     });
     Promise.all([asked, load_part(() => import('./headset'))])
