@@ -81,30 +81,33 @@ HWY_INLINE void write_paths(const Sweep<Floats>& s, const Floats& log2_opacity, 
 
 /// An eye of a task, and the splats that are written for it.
 struct TaskEye {
-  CameraModel<Floats> camera;
+  const CameraModel<Floats>* camera;
   Vec3<Floats> colours_from;
   DepthLimits limits;
   Splat* splats;
-  std::uint32_t visible = 0;
+  std::uint32_t visible;
 };
 
-/// The eyes of a task; a second one, if there is one.
+/// The eyes of a task: `count` of them.
 struct TaskEyes {
+  CameraModel<Floats> second_camera;
   TaskEye eyes[2];
   int count;
   bool share_colours;  // what the first eye sees is what the second sees
 };
 
-inline TaskEyes eyes_of(const ProjectTask& task, const CameraModel<Floats>& camera) {
-  TaskEye first{camera, camera.eye, task.limits, task.splats};
+/// `camera`: of the first eye.
+inline void find_eyes(const ProjectTask& task, const CameraModel<Floats>& camera, TaskEyes& out) {
   const SecondEye& second = task.second;
-  if (second.camera == nullptr) return {{first, first}, 1, true};
-  const auto right_camera = convert<Floats>(make_camera_model(*second.camera));
-  TaskEye right{right_camera, right_camera.eye, second.limits, second.splats};
-  if (second.colours_from == nullptr) return {{first, right}, 2, false};
+  out.eyes[0] = {&camera, camera.eye, task.limits, task.splats, 0};
+  out.count = second.camera == nullptr ? 1 : 2;
+  out.share_colours = second.colours_from != nullptr;
+  if (out.count == 1) return;
+  out.second_camera = convert<Floats>(make_camera_model(*second.camera));
+  out.eyes[1] = {&out.second_camera, out.second_camera.eye, second.limits, second.splats, 0};
+  if (!out.share_colours) return;
   const glm::vec3& from = *second.colours_from;
-  first.colours_from = right.colours_from = {Floats(from.x), Floats(from.y), Floats(from.z)};
-  return {{first, right}, 2, true};
+  for (TaskEye& eye : out.eyes) eye.colours_from = {Floats(from.x), Floats(from.y), Floats(from.z)};
 }
 
 /// Some Gaussians before they are projected.
@@ -125,9 +128,9 @@ HWY_INLINE std::uint32_t project_for(const SceneStore& scene, const TaskEye& eye
                                      Sweep<Floats>& s, SplatLook& look, SplatBox& box) {
   constexpr bool sweeps = pipeline == Pipeline::paper;
   if constexpr (sweeps) {
-    s = sweep(eye.camera, end_camera, g.mean, g.factor, g.depth);
+    s = sweep(*eye.camera, end_camera, g.mean, g.factor, g.depth);
   } else {
-    s.shape = project(eye.camera, g.mean, g.factor, g.depth);
+    s.shape = project(*eye.camera, g.mean, g.factor, g.depth);
   }
   look.log2_opacity = look_of(scene, g.log2_opacity, s.shape);
   // On a path the footprint changes; that with all of the opacity holds it.
@@ -154,7 +157,8 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   const ProjectionContext context = make_context(*task.camera);
   const Vec2<Floats> last_px{Floats(static_cast<float>(task.camera->size_px.x - 1)),
                              Floats(static_cast<float>(task.camera->size_px.y - 1))};
-  TaskEyes eyes = eyes_of(task, context.camera);
+  TaskEyes eyes;
+  find_eyes(task, context.camera, eyes);
   CameraModel<Floats> end_camera;
   if constexpr (sweeps) {
     end_camera = convert<Floats>(make_camera_model(*task.window_end));
@@ -204,7 +208,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
     if constexpr (sweeps) extremes.add_paths(counted, s.displacement);
   }
   ClusterSummary summary = extremes.summary(eyes.eyes[0].visible);
-  summary.visible_to_second = eyes.eyes[1].visible;
+  if (eyes.count > 1) summary.visible_to_second = eyes.eyes[1].visible;
   return summary;
 }
 

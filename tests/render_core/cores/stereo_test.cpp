@@ -87,6 +87,24 @@ TEST_F(StereoViews, HalvesAreWhatEachEyeSees) {
   }
 }
 
+// Colours that depend much on the direction, from so far that a View may see them from the middle
+// of the head.
+TEST_F(StereoViews, FarColoursAreThoseOfEachEye) {
+  const auto renderer =
+      core_renderer_of(std::make_shared<const GaussianCloud>(random_cloud(4'000, 3, 8)));
+  const Stereo eyes{Eye{{-0.032f, 0.0f}, {-0.15f, -0.1f}, {0.1f, 0.1f}},
+                    Eye{{0.032f, 0.0f}, {-0.1f, -0.1f}, {0.15f, 0.1f}}};
+  const FrameRequest request = stereo_request(look_at({0, 0, -15}, {0, 0, 5}), {320, 128}, eyes);
+  for (const Bound& bound : bounds) {
+    SCOPED_TRACE(static_cast<int>(bound.pipeline));
+    const ViewSettings settings{.pipeline = bound.pipeline};
+    const auto view = renderer->make_view(settings), left = renderer->make_view(settings),
+               right = renderer->make_view(settings);
+    for (int frame = 0; frame < 2; ++frame)
+      expect_halves_of(*view, *left, *right, request, std::min(bound.least_db, 55.0));
+  }
+}
+
 TEST_F(StereoViews, ExactPicturesEqualTheReference) {
   const auto cloud = std::make_shared<const GaussianCloud>(random_cloud(2'000, 3, 5));
   FrameRequest request = stereo_request({});
