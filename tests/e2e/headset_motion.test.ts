@@ -3,7 +3,7 @@ import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, expect, it } from 'vitest';
-import { add, angle_between, rotate } from '#client/base/vector';
+import { add, rotate } from '#client/base/vector';
 import type { Pose } from '#client/camera/eye';
 import { keep_screenshot, open } from './support/browser';
 import { pose_of } from './support/camera';
@@ -36,9 +36,6 @@ interface Shot {
   readonly picture: Picture;
   /** The head in the world when both eyes were drawn. */
   readonly head: Pose;
-  /** The head of the newest picture. */
-  readonly rendered: Pose;
-  readonly is_stereo: boolean;
 }
 
 /** Turns and sways the head, and takes what its eyes see in the middle of some movements. */
@@ -52,7 +49,7 @@ async function shots_in_motion(page: Page, count: number): Promise<Shot[]> {
           willReadFrequently: true,
         })!;
         const begin = performance.now();
-        const shots: Promise<Shot>[] = [];
+        const shots: Shot[] = [];
         let next_s = 4; // the first movements warm up
         // Hears each refresh after the page, which has asked for it before.
         const refreshed = (): void => {
@@ -63,18 +60,9 @@ async function shots_in_motion(page: Page, count: number): Promise<Shot[]> {
             const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
             const picture = { width: canvas.width, height: canvas.height, rgba: data };
             const head = window.catgs!.pose();
-            shots.push(
-              window.catgs!.snapshot().then(({ header }) => {
-                const { position: p, orientation: q } = header.renderPose!;
-                const rendered: Pose = {
-                  position: [p!.x, p!.y, p!.z],
-                  orientation: [q!.x, q!.y, q!.z, q!.w],
-                };
-                return { picture, head, rendered, is_stereo: header.stereo !== undefined };
-              }),
-            );
+            shots.push({ picture, head });
           }
-          if (shots.length === wanted) return void Promise.all(shots).then(resolve);
+          if (shots.length === wanted) return resolve(shots);
           const turn = 0.35 * Math.sin(seconds); // up to 20 degrees a second
           const sway = 0.25 * Math.sin(1.4 * seconds);
           quaternion.set(0, Math.sin(turn / 2), 0, Math.cos(turn / 2));
@@ -136,14 +124,11 @@ it('both eyes see things where they are while the head moves over a slow link', 
   for (const [i, shot] of shots.entries()) found.push(...(await errors_deg(page, shot, `${i}`)));
   found.sort((a, b) => a - b);
   const p95 = found[Math.floor(0.95 * found.length)]!;
-  const lags = shots.map(
-    ({ head, rendered }) => (angle_between(head.orientation, rendered.orientation) * 180) / Math.PI,
-  );
   console.log(
     `${2 * delay_each_way_ms} ms: ${found.length} blocks of both eyes, median ${median(found).toFixed(2)}, ` +
-      `p95 ${p95.toFixed(2)} degrees; pictures late by ${lags.map((v) => v.toFixed(1)).join(', ')} degrees`,
+      `p95 ${p95.toFixed(2)} degrees (some blocks match wrongly)`,
   );
-  expect(shots.every(({ is_stereo }) => is_stereo)).toBe(true);
+  expect((await page.evaluate(() => window.catgs!.stats())).eyes).toBe(2);
   expect(found.length).toBeGreaterThan(40);
   expect(median(found)).toBeLessThan(0.5);
   expect(errors).toEqual([]);

@@ -161,14 +161,18 @@ describe('newest frame wins', () => {
     expect(acks).toMatchObject([{ poseAgeUs: 60_000 }]);
   });
 
-  it('says when a visitor sees a picture that a headset shows later', async () => {
+  it('says when a visitor sees a picture that a headset shows later, if ever', async () => {
     const made = await configure();
     push(1n, { poseClientTimeUs: 10_000n });
     decode(made, 1n);
     draw = () => Promise.resolve(90_000);
     now_us = 70_000;
     await display();
-    expect(acks).toMatchObject([{ presentedUs: 90_000n, poseAgeUs: 80_000 }]);
+    push(2n);
+    decode(made, 2n);
+    draw = () => Promise.resolve(0); // never
+    await display();
+    expect(acks).toMatchObject([{ presentedUs: 90_000n, poseAgeUs: 80_000 }, { dropped: true }]);
   });
 
   it('drops what a hidden page will not draw', async () => {

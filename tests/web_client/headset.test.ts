@@ -18,6 +18,7 @@ import {
   head_of,
   picture_for,
   rate_for,
+  same_stream,
   stream_for,
   units_per_metre_of,
 } from '#client/headset/eyes';
@@ -233,6 +234,33 @@ describe('a head', () => {
     const half = Math.tan(fov_y_rad / 2);
     expect(half).toBeGreaterThanOrEqual(stereo!.right!.down! - 1e-6);
     expect((half * settings.widthPx!) / 1120).toBeGreaterThanOrEqual(stereo!.right!.right! - 1e-6);
+  });
+
+  it('asks again when something has changed that can be seen', () => {
+    const wanted = { overscan: { x: 1.26, y: 1.12 }, height_px: 1000, most_px: 8192, rate_hz: 72 };
+    const stream = (change: (of: ReturnType<typeof viewer>) => void, units_per_metre = 10) => {
+      const given = structuredClone(viewer());
+      change(given);
+      return stream_for(head_of(given), { ...wanted, units_per_metre });
+    };
+    const first = stream(() => undefined);
+    const moved_by = (x: number, y: number) =>
+      stream(({ views }) => {
+        views[1]!.transform.position.x += x;
+        views[1]!.transform.position.y += y;
+      });
+    expect(same_stream(first, moved_by(1e-6, -1e-7), 10)).toBe(true);
+    expect(same_stream(first, moved_by(2e-3, 0), 10)).toBe(false);
+    expect(
+      same_stream(
+        first,
+        stream(() => undefined, 11),
+        11,
+      ),
+    ).toBe(false);
+    expect(same_stream(undefined, first, 10)).toBe(false);
+    const wide = stream(({ views }) => (views[0]!.projectionMatrix[0] = 0.9));
+    expect(same_stream(first, wide, 10)).toBe(false);
   });
 
   it('asks for no more pixels than a picture may have', () => {

@@ -108,6 +108,13 @@ describe('the arc of a teleport', () => {
     expect(points).toBeGreaterThan(5);
   });
 
+  it('ends at a ceiling, not on the floor above it', () => {
+    // The floor is 1 m up, and the hand is 0.5 m below it.
+    const { stand, points } = landing(map, thrown(at(2, 2, 0.5), height, scale(height, -1)));
+    expect(stand).toBeUndefined();
+    expect(points).toBeLessThan(5);
+  });
+
   it('ends nowhere where there is no floor', () => {
     const hole = flat_map(200, 200, (x) => x < 30);
     expect(landing(hole, thrown(at(2, 2, 2.25), east, scale(height, -1))).stand).toBeUndefined();

@@ -28,6 +28,7 @@ interface Emulated extends Tracked {
   readonly activeSession:
     | { end(): Promise<void>; requestAnimationFrame(refreshed: () => void): void }
     | undefined;
+  recenter(): void;
   updateVisibilityState(state: 'visible' | 'visible-blurred' | 'hidden'): void;
 }
 

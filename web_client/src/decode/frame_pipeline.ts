@@ -21,7 +21,7 @@ export interface PipelineEnvironment {
   on_refresh: (draw: () => void) => void;
   /**
    * One at a time; the picture is free when the promise resolves: with the time at which the visitor sees it, where
-   * that is not then.
+   * that is not then; with 0 where nobody does.
    */
   draw: (picture: Picture, header: FrameHeader) => Promise<number | undefined>;
 }
@@ -240,7 +240,8 @@ export class FramePipeline {
       this.failed(error); // another way to decode may give pictures that can be drawn
       return;
     }
-    const presented_us = seen_us || this.env_.now_us();
+    if (seen_us === 0) return this.drop(frame);
+    const presented_us = seen_us ?? this.env_.now_us();
     this.ack(frame, presented_us);
     this.listener_.presented(frame, presented_us);
   }

@@ -116,6 +116,30 @@ export function stream_for(head: Head, wanted: Wanted): HeadsetStream | undefine
   };
 }
 
+const same_offset_m = 5e-4; // headsets measure the distance of the eyes again and again
+const same_tangent = 1e-3;
+
+/** Whether the server need not hear of the newer one. */
+export function same_stream(
+  a: HeadsetStream | undefined,
+  b: HeadsetStream | undefined,
+  units_per_metre: number,
+): boolean {
+  if (!a || !b) return a === b;
+  for (const side of ['left', 'right'] as const) {
+    const [x, y] = [a.settings.stereo?.[side], b.settings.stereo?.[side]];
+    if (!x || !y) return false;
+    const near = (field: keyof Frustum | 'rightOfPose' | 'belowPose', most: number): boolean =>
+      Math.abs((x[field] ?? 0) - (y[field] ?? 0)) <= most;
+    const offsets = ['rightOfPose', 'belowPose'] as const;
+    const sides = ['left', 'right', 'up', 'down'] as const;
+    if (!offsets.every((field) => near(field, same_offset_m * units_per_metre))) return false;
+    if (!sides.every((field) => near(field, same_tangent))) return false;
+  }
+  const fields = ['widthPx', 'heightPx', 'maxFps'] as const;
+  return fields.every((field) => a.settings[field] === b.settings[field]);
+}
+
 /** The part of a picture that an eye sees, and its camera; `camera`: that of the frame, in any coordinates. */
 export function picture_for(half: 0 | 1, header: FrameHeader, camera: Pose): FrustumView {
   const { stereo } = header;

@@ -8,8 +8,8 @@ import { frame_ms_of } from '../session/quality';
 import type { MeasureList } from '../tour/measure_list';
 import type { TourPlayer } from '../tour/player';
 import type { WalkMap } from '../walk/walk_map';
-import type { HeadsetPicture } from '../worker/headset';
-import { head_of, rate_for, stream_for, type Head } from './eyes';
+import type { HeadsetPicture, HeadsetStream } from '../worker/headset';
+import { head_of, rate_for, same_stream, stream_for, type Head } from './eyes';
 import { SpaceHotspots } from './hotspots';
 import { Locomotion } from './locomotion';
 import { Overlay } from './overlay';
@@ -52,7 +52,7 @@ interface Worn {
   awaited: { readonly pose_id: number; readonly until_ms: number } | undefined;
   dark: number;
   border: number;
-  stream: string; // as the server was asked for it
+  stream: HeadsetStream | undefined; // as the server was asked for it
   rate_hz: number; // measured
   counted: number;
   counted_from_ms: number;
@@ -116,7 +116,7 @@ export class Headset {
       alpha: false,
       framebufferScaleFactor: most > 0 ? Math.min(1, most) : 1,
     });
-    void session.updateRenderState({ baseLayer: layer, depthNear: 0.05, depthFar: 1000 });
+    void session.updateRenderState({ baseLayer: layer, depthNear: 0.05, depthFar: 1e5 });
     const space = await session.requestReferenceSpace('local-floor').catch(async () => {
       const at_head = await session.requestReferenceSpace('local');
       return at_head.getOffsetReferenceSpace(new XRRigidTransform({ y: -assumed_floor_m }));
@@ -135,13 +135,20 @@ export class Headset {
       awaited: undefined,
       dark: 0,
       border: 0,
-      stream: '',
+      stream: undefined,
       rate_hz: 0,
       counted: 0,
       counted_from_ms: performance.now(),
     };
     session.addEventListener('end', () => this.ended());
-    session.addEventListener('visibilitychange', () => this.tell_hidden());
+    session.addEventListener('visibilitychange', () => {
+      if (session.visibilityState !== 'visible') this.pointers_.let_go();
+      this.tell_hidden();
+    });
+    // Somebody has centred the headset anew: the visitor stays where they are in the scene.
+    space.addEventListener('reset', () => {
+      if (this.worn_) this.worn_.put = undefined;
+    });
     this.pointers_.bind(session, space);
     this.choose_rate();
     session.requestAnimationFrame(this.refresh);
@@ -153,10 +160,10 @@ export class Headset {
     if (!gl) throw new Error('there is no WebGL2');
     canvas.addEventListener('webglcontextlost', () => {
       this.drawing_ = undefined;
-      void this.worn_?.session.end();
+      this.leave();
     });
     const panel = new Panel(gl, {
-      leave: () => void this.worn_?.session.end(),
+      leave: () => this.leave(),
       darkens: () => this.darkens_,
       set_darkens: (on) => {
         this.darkens_ = on;
@@ -172,6 +179,10 @@ export class Headset {
     };
   }
 
+  private leave(): void {
+    this.worn_?.session.end().catch(() => undefined); // it has ended by itself
+  }
+
   /** Leads to a stop; who is there goes through its portal. */
   private press_stop(index: number): void {
     const { player } = this.parts_.tours;
@@ -185,8 +196,9 @@ export class Headset {
     const { worn_: worn, head_: head } = this;
     if (!worn) return;
     this.worn_ = this.head_ = undefined;
-    this.teleport_.end();
+    this.pointers_.let_go();
     this.release(0);
+    this.drawing_?.picture.clear();
     const { navigation, worker } = this.parts_;
     navigation.jumps = false;
     worker.post({ kind: 'headset', stream: undefined });
@@ -232,7 +244,10 @@ export class Headset {
     const viewer = frame.getViewerPose(worn.space);
     if (!viewer) return; // the headset has lost its way for a moment
     const now = performance.now();
-    const { predictedDisplayTime: said = now_ms } = frame as { predictedDisplayTime?: number };
+    const refresh_ms = 1000 / this.rate_hz(worn.session);
+    const { predictedDisplayTime: said = now_ms + refresh_ms } = frame as {
+      predictedDisplayTime?: number;
+    };
     const seen_ms = clamp(said, now, now + latest_ms);
     const head = head_of(viewer);
     const dt_s = Math.min((now - worn.last_ms) / 1000, longest_step_s);
@@ -250,13 +265,13 @@ export class Headset {
   private move(worn: Worn, drawing: Drawing, head: Pose, frame: XRFrame, dt_s: number): void {
     const { navigation, tours, measures, walkable_area } = this.parts_;
     const { camera } = navigation;
-    if (camera.is_flying) camera.step(longest_step_s);
     // A film of the camera moves by itself, which nobody stands in a headset.
     if (tours.player.state.playing && !tours.player.state.stop) tours.player.pause();
-    this.moves_.look(walkable_area.map, measures.metres_per_unit, head);
+    if (camera.is_flying) camera.step(Infinity); // to its end
+    if (this.moves_.look(walkable_area.map, measures.metres_per_unit, head)) this.darken(worn);
     if (camera.pose !== worn.put) {
       this.moves_.place(camera.pose, head);
-      if (worn.put) this.darken(worn);
+      this.darken(worn);
       worn.put = camera.pose;
     }
     const { rig } = this.moves_;
@@ -298,12 +313,8 @@ export class Headset {
       rate_hz: this.rate_hz(worn.session),
       units_per_metre: rig.units_per_metre,
     });
-    // Headsets measure the distance of the eyes again and again.
-    const asked = JSON.stringify(stream, (_, v: unknown) =>
-      typeof v === 'number' ? Number(v.toPrecision(4)) : v,
-    );
-    if (asked !== worn.stream) {
-      worn.stream = asked;
+    if (stream && !same_stream(worn.stream, stream, rig.units_per_metre)) {
+      worn.stream = stream;
       worker.post({ kind: 'headset', stream });
     }
     navigation.loop.sample(Math.round(seen_us));
@@ -331,6 +342,12 @@ export class Headset {
   /** Until there is a picture of where the visitor is now. */
   private darken(worn: Worn): void {
     worn.dark = 1;
+    this.await_picture(worn);
+  }
+
+  /** The newest pictures are of where the visitor was, or looked, before. */
+  private await_picture(worn: Worn): void {
+    this.overscan_.jumped();
     const pose_id = this.parts_.navigation.loop.pose_id + 1;
     worn.awaited = { pose_id, until_ms: performance.now() + longest_dark_ms };
   }
@@ -360,7 +377,7 @@ export class Headset {
     }
     const [eye] = head.eyes;
     const shown = eye && picture.camera_of(eye.half);
-    if (!shown) return;
+    if (!shown || worn.awaited) return;
     const seen = { ...rig.to_world(eye.pose), orientation: rig.to_world(head.pose).orientation };
     const now_us = this.parts_.clock.now_us();
     this.overscan_.drawn(shown, seen, eye.parallel, shown.distance, now_us);
@@ -368,7 +385,8 @@ export class Headset {
 
   private target(ray: RoomRay): Target | undefined {
     const { drawing_: drawing } = this;
-    return drawing?.panel.pointed(ray) ?? drawing?.hotspots.pointed(ray);
+    const panel = this.teleport_.is_on ? undefined : drawing?.panel; // it is hidden then
+    return panel?.pointed(ray) ?? drawing?.hotspots.pointed(ray);
   }
 
   private go_to(floor: Vec3 | undefined): void {
@@ -380,10 +398,11 @@ export class Headset {
   }
 
   private turn(steps: number): void {
-    const { head_: head } = this;
-    if (!head) return;
+    const { worn_: worn, head_: head } = this;
+    if (!worn || !head) return;
     this.parts_.navigation.taken_over.emit();
     this.moves_.turn(steps, head.pose);
+    this.await_picture(worn);
   }
 
   private count(worn: Worn, now_ms: number): void {

@@ -1,6 +1,6 @@
 // How a visitor with a headset gets about: the room of the headset moves through the scene.
 import { add, dot, rotate, scale, sub, type Vec3 } from '../base/vector';
-import type { Eye, Pose } from '../camera/eye';
+import type { Pose } from '../camera/eye';
 import type { Navigation } from '../page/navigation';
 import { MapWalker } from '../walk/map_walker';
 import type { WalkMap } from '../walk/walk_map';
@@ -21,20 +21,24 @@ export class Locomotion {
     this.rig = new Rig(navigation_.camera.up, 1);
   }
 
-  /** Follows the scene, its up, its walkable area and its scale. `head`: in the room, which moves about it. */
-  look(map: WalkMap | undefined, metres_per_unit: number | undefined, head: Pose): void {
+  /**
+   * Follows the scene, its up, its walkable area and its scale. `head`: in the room, which moves about it. Returns
+   * whether the visitor has another size or stands another way now.
+   */
+  look(map: WalkMap | undefined, metres_per_unit: number | undefined, head: Pose): boolean {
     if (map !== this.walker_?.map) this.walker_ = map && new MapWalker(map);
     const { up } = this.navigation_.camera;
     const { walker_: walker } = this;
     const units = units_per_metre_of(metres_per_unit, walker?.eye_height, this.navigation_.reach);
     const made_for = JSON.stringify([up, units]);
-    if (made_for === this.made_for_) return;
+    if (made_for === this.made_for_) return false;
     const is_first = this.made_for_ === '';
     const { position } = this.rig.to_world(head);
     this.made_for_ = made_for;
     const before = this.rig;
     this.rig = new Rig(up, units);
     if (!is_first) this.place({ ...before.to_world(head), position }, head);
+    return !is_first;
   }
 
   /** Puts the visitor where a camera of the flat page is: on the floor, where that is below it. */
@@ -59,11 +63,6 @@ export class Locomotion {
       this.rig.move(sub(camera.within(add(position, way)), position));
     }
     return true;
-  }
-
-  /** How the flat page goes on from here: there, nobody tilts their head. */
-  flat_eye(head: Pose, fov_y_rad: number): Eye {
-    return { ...this.rig.to_world(head), fov_y_rad };
   }
 
   private walk(aside: number, ahead: number, head: Pose, dt_s: number): void {

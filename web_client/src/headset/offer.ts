@@ -4,6 +4,8 @@ import { by_id, make } from '../page/dom';
 import { text } from '../text/text';
 import type { Headset, HeadsetParts } from './headset';
 
+const look_again_ms = 10_000;
+
 type WithXr = Navigator & { readonly xr?: XRSystem };
 
 /**
@@ -25,7 +27,11 @@ async function has_headset(): Promise<boolean> {
 export function offer_headset(parts: HeadsetParts): void {
   if (!('xr' in navigator)) return;
   const button = by_id('button-headset', HTMLButtonElement);
+  let looked_ms = -Infinity;
   const look = async (): Promise<void> => {
+    const now_ms = performance.now();
+    if (now_ms - looked_ms < look_again_ms) return;
+    looked_ms = now_ms;
     button.hidden = !(await has_headset());
   };
   void look();

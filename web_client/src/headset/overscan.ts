@@ -8,7 +8,7 @@ import { WarpPolicy } from '../present/warp_policy';
 /** As the flat page decides it (present/display.ts), but a head always moves: some is always there. */
 export class HeadsetOverscan {
   private readonly policy_ = new WarpPolicy(true);
-  private readonly turn_ = new TurnForecast();
+  private turn_ = new TurnForecast();
 
   constructor() {
     this.policy_.mode = 'on';
@@ -16,6 +16,11 @@ export class HeadsetOverscan {
 
   get sides(): Sides {
     return this.policy_.overscan;
+  }
+
+  /** The visitor is elsewhere, or looks elsewhere, without having turned. */
+  jumped(): void {
+    this.turn_ = new TurnForecast();
   }
 
   moved(sample: CameraSample): void {

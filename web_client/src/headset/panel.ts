@@ -52,14 +52,16 @@ const look_ms = 200;
 const is_shown = (id: string): boolean => !by_id(id, HTMLElement).hidden;
 const said = (id: string): string => by_id(id, HTMLElement).innerText.trim();
 
-/** A button of the page; undefined where the page does not offer it. */
-function page_button(id: string, icon?: string): Button[] {
+/** A button of the page, with the words or the icon that it has now; none where the page does not offer it. */
+function page_button(id: string): Button[] {
   const button = by_id(id, HTMLButtonElement);
   if (button.hidden || button.disabled) return [];
+  const words = said(id);
+  const icon = button.querySelector('use')?.getAttribute('href')?.replace('#icon-', '');
   return [
     {
-      label: icon ?? said(id),
-      ...(icon !== undefined && { icon }),
+      label: words || (icon ?? id),
+      ...(!words && icon && { icon }),
       is_on: button.getAttribute('aria-pressed') === 'true',
       press: () => button.click(),
     },
@@ -70,36 +72,28 @@ function content_of(actions: PanelActions): Content {
   const has_tour = is_shown('tour');
   const is_urgent = is_shown('card');
   const note = is_shown('notice') ? said('notice-text') : '';
-  const tour = has_tour
-    ? [
-        ...page_button('tour-previous', 'previous'),
-        ...page_button('tour-play', is_on('tour-play') ? 'pause' : 'play'),
-        ...page_button('tour-next', 'next'),
-      ]
-    : [];
+  const tour = ['tour-previous', 'tour-play', 'tour-next', 'tour-portal'];
   const closed = is_shown('tour-closed') ? said('tour-closed') : '';
+  const darken = {
+    label: text.headset.darken,
+    is_on: actions.darkens(),
+    press: () => actions.set_darkens(!actions.darkens()),
+  };
+  const leave = { label: text.headset.leave, is_on: false, press: () => actions.leave() };
   return {
     title: is_urgent ? said('card-title') : has_tour ? said('tour-title') : '',
     words: is_urgent
       ? said('card-text')
       : [note, has_tour ? said('tour-text') : '', closed].filter((s) => s !== '').join('\n'),
     rows: [
-      [...tour, ...(has_tour ? page_button('tour-portal') : [])],
-      [
-        {
-          label: text.headset.darken,
-          is_on: actions.darkens(),
-          press: () => actions.set_darkens(!actions.darkens()),
-        },
-        { label: text.headset.leave, is_on: false, press: () => actions.leave() },
-      ],
+      is_urgent ? page_button('card-action') : [],
+      has_tour ? tour.flatMap(page_button) : [],
+      [...page_button('button-mode'), ...page_button('button-sound'), darken],
+      [leave],
     ].filter((row) => row.length > 0),
     is_urgent,
   };
 }
-
-const is_on = (id: string): boolean =>
-  by_id(id, HTMLElement).getAttribute('aria-pressed') === 'true';
 
 /** Breaks words into lines, at most so many. */
 function lines_of(context: CanvasRenderingContext2D, words: string): string[] {
@@ -134,6 +128,8 @@ export class Panel {
   private is_urgent_ = false;
   private looked_ms_ = -Infinity;
   private pointed_: Button | undefined;
+  private outlined_: string | undefined; // as it is painted
+  private content_: Content | undefined;
 
   constructor(
     gl: WebGL2RenderingContext,
@@ -159,9 +155,15 @@ export class Panel {
   }
 
   draw(overlay: Overlay, head: Pose, now_ms: number): void {
-    if (now_ms - this.looked_ms_ > look_ms || this.pointed_) {
+    const looks = now_ms - this.looked_ms_ > look_ms;
+    if (looks) {
       this.looked_ms_ = now_ms;
-      this.paint(content_of(this.actions_));
+      this.content_ = content_of(this.actions_);
+    }
+    const pointed = this.pointed_?.label;
+    if (this.content_ && (looks || pointed !== this.outlined_)) {
+      this.outlined_ = pointed;
+      this.paint(this.content_);
     }
     this.pointed_ = undefined;
     this.place(head);

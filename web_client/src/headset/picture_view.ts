@@ -74,6 +74,14 @@ export class PictureView {
     this.halves_ = halves_of(shown);
   }
 
+  /** Shows nothing until there is another picture, and keeps no memory for it. */
+  clear(): void {
+    const gl = this.gl_;
+    this.halves_ = undefined;
+    gl.bindTexture(gl.TEXTURE_2D, this.texture_);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
+  }
+
   /** What an eye sees the picture from; undefined: there is none yet. */
   camera_of(half: 0 | 1): (FrustumView & { readonly distance: number }) | undefined {
     const shown = this.halves_?.[half];

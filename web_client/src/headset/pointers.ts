@@ -26,7 +26,7 @@ const least_hold_ms = 250; // a shorter press that meets nothing is a slip
 const shown_m = 1.2; // of a ray that meets nothing
 
 export class Pointers {
-  private readonly sticks_ = new Map<XRHandedness, TurnStick>();
+  private sticks_ = new WeakMap<XRInputSource, TurnStick>();
   private rays_: readonly { readonly ray: RoomRay; readonly target: Target | undefined }[] = [];
   private pressed_: { readonly source: XRInputSource; readonly id: string } | undefined;
   private aims_: XRInputSource | undefined;
@@ -37,9 +37,7 @@ export class Pointers {
 
   /** Hears a session as long as it lasts. */
   bind(session: XRSession, space: XRReferenceSpace): void {
-    this.pressed_ = this.aims_ = undefined;
-    this.rays_ = [];
-    this.sticks_.clear();
+    this.let_go();
     session.addEventListener('selectstart', ({ inputSource: source, frame }) => {
       const ray = ray_of(source, frame, space);
       const target = ray && this.actions_.target(ray);
@@ -55,6 +53,15 @@ export class Pointers {
       if (target?.id === this.pressed_.id) target.press();
       this.pressed_ = undefined;
     });
+  }
+
+  /** Nothing is held any more: the session begins, or something else has the controllers. */
+  let_go(): void {
+    if (this.aims_) this.end_aim(false);
+    this.pressed_ = undefined;
+    this.rays_ = [];
+    this.push_ = [0, 0];
+    this.sticks_ = new WeakMap();
   }
 
   /** The ray of who aims. */
@@ -93,8 +100,8 @@ export class Pointers {
   }
 
   private steer(source: XRInputSource): void {
-    const stick = this.sticks_.get(source.handedness) ?? new TurnStick();
-    this.sticks_.set(source.handedness, stick);
+    const stick = this.sticks_.get(source) ?? new TurnStick();
+    this.sticks_.set(source, stick);
     const { turn, aim } = stick.move(...stick_of(source));
     if (turn !== 0) this.actions_.turn(turn);
     if (aim === 'begins') this.aim(source);

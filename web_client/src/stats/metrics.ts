@@ -37,6 +37,7 @@ export interface StatsSnapshot extends Motion {
   /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
   readonly pages: PagesDrawn | undefined;
   readonly gpu: GpuUse | undefined; // of the last second in which one drew
+  readonly eyes: number; // that the last picture is for; 2: a headset's
   readonly headset_hz: number | undefined; // refreshes of the headset that the visitor wears
 }
 
@@ -79,6 +80,7 @@ export class Metrics {
   private packets_dropped_ = 0;
   private pages_: PagesDrawn | undefined;
   private gpu_: GpuUse | undefined;
+  private eyes_ = 1;
   /** Undefined: the visitor wears no headset. */
   headset_hz: number | undefined;
 
@@ -98,6 +100,7 @@ export class Metrics {
     const { header } = frame;
     this.frames_shown_ += 1;
     this.size_px_ = [header.widthPx, header.heightPx];
+    this.eyes_ = header.stereo ? 2 : 1;
     this.shown_.push(now_us, 1);
     const pose_time_us = Number(header.poseClientTimeUs);
     // One picture of each pose counts. Pictures before the first pose do not.
@@ -158,6 +161,7 @@ export class Metrics {
       packets_dropped: this.packets_dropped_,
       pages: this.pages_,
       gpu: this.gpu_,
+      eyes: this.eyes_,
       headset_hz: this.headset_hz,
       last_motion: this.motion((window) => window.newest()),
     };

@@ -42,6 +42,20 @@ export class HeadsetOutput {
   }
 }
 
+/** What hands on pictures from now on. A picture on the way to a headset that goes is not seen any more. */
+export function output_for(
+  stream: HeadsetStream | undefined,
+  before: HeadsetOutput | undefined,
+  say: ConstructorParameters<typeof HeadsetOutput>[1],
+): HeadsetOutput | undefined {
+  if (before && stream) {
+    before.stream = stream;
+    return before;
+  }
+  before?.shown(0);
+  return stream && new HeadsetOutput(stream, say);
+}
+
 /**
  * Draws what the left eye sees in a picture of both, for pages without a headset: those that watch somebody with
  * one, and those whose visitor has just taken it off.

@@ -116,10 +116,9 @@ class Client {
   /** Undefined: the visitor has taken the headset off. */
   private wear(stream: HeadsetStream | undefined): void {
     import('./headset').then(
-      ({ HeadsetOutput }) => {
-        this.headset_?.shown(0); // not, unless the page has said so before
-        this.headset_ = stream && new HeadsetOutput(stream, say);
-        this.metrics_.headset_hz = undefined;
+      ({ output_for }) => {
+        this.headset_ = output_for(stream, this.headset_, say);
+        if (!stream) this.metrics_.headset_hz = undefined;
         this.send_sizes();
       },
       (error: unknown) => say({ kind: 'error', message: String(error) }),
@@ -400,8 +399,10 @@ class Client {
   }
 
   private widened(eye: Eye): Eye {
-    if (this.headset_) return { ...eye, fov_y_rad: this.headset_.stream.fov_y_rad };
-    return widened(eye, this.display_.overscan.y);
+    const { headset_: headset } = this;
+    if (!headset) return widened(eye, this.display_.overscan.y);
+    // A server that draws both eyes needs no other, and hands on this one to followers.
+    return this.shown_?.stereo ? eye : { ...eye, fov_y_rad: headset.stream.fov_y_rad };
   }
 
   private tell_presenter(): void {
@@ -442,7 +443,8 @@ class Client {
   }
 
   private post_snapshot(request: number): void {
-    const snapshot = this.shown_ && snapshot_of(this.display_, this.shown_, this.coordinates_);
+    const shown = this.headset_ ? undefined : this.shown_; // the canvas shows another
+    const snapshot = shown && snapshot_of(this.display_, shown, this.coordinates_);
     say({ kind: 'snapshot', request, snapshot }, snapshot && [snapshot.rgba.buffer]);
   }
 }
