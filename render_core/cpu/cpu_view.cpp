@@ -46,35 +46,52 @@ CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& sett
 RenderStatus CpuView::render(const FrameRequest& request, FrameView& frame) noexcept {
   return driver_.render(
       request, frame, [&](const FramePlan& plan) { return draw(request, plan); },
-      [&] { occlusion_.forget(); });
+      [&] {
+        for (EyeBuffers& eye : both_eyes_) eye.occlusion.forget();
+      });
+}
+
+/// Sets what the eyes of a frame see, and where in the image they see it.
+void CpuView::begin_eyes(const FrameRequest& request) {
+  const std::vector<Camera> cameras = cameras_of(request);
+  const glm::ivec2 size_px = cameras.front().size_px;
+  const glm::ivec2 cells = request.depth_cells / glm::ivec2(static_cast<int>(cameras.size()), 1);
+  image_.resize(settings_.format, request.camera.size_px);
+  tiles_ = (size_px + (tile_size_px - 1)) / tile_size_px;
+  eyes_ = std::span(both_eyes_).first(cameras.size());
+  for (std::size_t i = 0; i < eyes_.size(); ++i) {
+    EyeBuffers& eye = eyes_[i];
+    eye.camera = cameras[i];
+    eye.picture = image_.part(static_cast<int>(i) * size_px.x, size_px);
+    eye.depths.begin(size_px, cells);
+    if (settings_.pipeline == Pipeline::catgs)
+      eye.occlusion.begin(eye.camera, mean_inverse_depth_, scene_->kernels, *scene_->pool);
+  }
+  for (EyeBuffers& closed : std::span(both_eyes_).subspan(eyes_.size())) closed.occlusion.forget();
 }
 
 FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
-  const Camera& camera = request.camera;
-  const bool occludes = settings_.pipeline == Pipeline::catgs;
   FrameStats stats;
   StageClock clock(stats);
-  image_.resize(settings_.format, camera.size_px);
-  tiles_ = (camera.size_px + (tile_size_px - 1)) / tile_size_px;
-  if (occludes) occlusion_.begin(camera, mean_inverse_depth_, scene_->kernels, *scene_->pool);
+  begin_eyes(request);
   clock.end(Stage::project);
   if (settings_.pipeline == Pipeline::vanilla) {
-    draw_boxes(camera, stats);
+    draw_boxes(request, stats);
   } else if (plan.kind == FrameKind::key) {
     draw_lists(request, plan, stats);
   } else {
-    draw_cached_lists(camera, stats);
+    draw_cached_lists(request.camera, stats);
   }
   clock.restart();
-  depths_.begin(camera.size_px, request.depth_cells);
   stats.blended_pairs = blend(request);
-  const DepthGrid depths = depths_.finish(*scene_->pool);
+  const DepthGrid depths = finish_depths(request.depth_cells);
   clock.end(Stage::blend);
-  if (occludes) occlusion_.finish();
+  if (settings_.pipeline == Pipeline::catgs)
+    for (EyeBuffers& eye : eyes_) eye.occlusion.finish();
   summarise(stats);
   if (paged_) paged_->end(stats);
   mean_inverse_depth_ = stats.mean_inverse_depth;
-  return {settings_.format, MemorySpace::host, camera.size_px, image_.planes(), stats, depths};
+  return {settings_.format, MemorySpace::host, image_.size_px(), image_.planes(), stats, depths};
 }
 
 void CpuView::summarise(FrameStats& stats) const {
@@ -82,7 +99,7 @@ void CpuView::summarise(FrameStats& stats) const {
   double inverse_depths = 0.0;
   std::uint64_t counted = 0;
   for (const ClusterSummary& summary : std::span(summaries_).first(clusters_.size())) {
-    stats.visible += summary.visible;
+    stats.visible += summary.visible + summary.visible_to_second;
     stats.nearest_depth = std::min(stats.nearest_depth, summary.nearest_depth);
     stats.displacement_px = std::max(stats.displacement_px, summary.longest_path_px);
     inverse_depths += static_cast<double>(summary.inverse_depth_sum);
@@ -102,30 +119,30 @@ void CpuView::summarise(FrameStats& stats) const {
   stats.overflowed_entries = lists_.overflowed_entries();
 }
 
-void CpuView::draw_boxes(const Camera& camera, FrameStats& stats) {
+void CpuView::draw_boxes(const FrameRequest& request, FrameStats& stats) {
   StageClock clock(stats);
-  const FramePlan plan{.window_end = camera};
-  cull_clusters(camera, plan);
-  project(camera, plan, segments(), [](std::size_t, std::size_t) {});
+  const FramePlan plan{.window_end = request.camera};
+  cull_clusters(plan);
+  project(request.camera, plan, segments(), [](std::size_t, std::size_t) {});
   clock.end(Stage::project);
-  lists_.build_by_keys(table(plan), tiles_, settings_.max_list_entries, *scene_->pool);
+  lists_.build_by_keys(table(plan), tiles_of_all(), settings_.max_list_entries, *scene_->pool);
   clock.end(Stage::sort);
 }
 
-/// Makes the lists for `camera`, and with a window for all cameras on the way to its end.
+/// Makes the lists of a frame, and with a window for all cameras on the way to its end.
 void CpuView::draw_lists(const FrameRequest& request, const FramePlan& plan, FrameStats& stats) {
-  const Camera& camera = request.camera;
   StageClock clock(stats);
   if (paged_) {
     cut_tree(request, plan);
   } else {
-    cull_clusters(camera, plan);
+    cull_clusters(plan);
   }
-  const std::size_t shares = segments();
-  lists_.begin(tiles_, shares, settings_.max_list_entries);
+  const std::size_t shares = segments(), ranks = clusters_.size();
+  lists_.begin(tiles_of_all(), shares, settings_.max_list_entries);
   // Listed while the splats are in cache. Reading them again would cost as much as the listing.
-  project(camera, plan, shares, [&](std::size_t segment, std::size_t rank) {
-    lists_.add(segment, table(plan).of_cluster(rank), scene_->kernels);
+  project(request.camera, plan, shares, [&](std::size_t segment, std::size_t rank) {
+    for (std::size_t e = 0; e < eyes_.size(); ++e)
+      lists_.add(segment, table(plan).of_cluster(e * ranks + rank), scene_->kernels);
   });
   clock.end(Stage::project);
   lists_.finish(table(plan), scene_->kernels, *scene_->pool);
@@ -151,16 +168,28 @@ void CpuView::draw_cached_lists(const Camera& camera, FrameStats& stats) {
   clock.end(Stage::project);
 }
 
-void CpuView::cull_clusters(const Camera& camera, const FramePlan& plan) {
+/// Finds the clusters that an eye may see.
+void CpuView::cull_clusters(const FramePlan& plan) {
   const std::span<const Cluster> clusters = scene_->store().clusters();
-  const ListCuller culler(camera, plan);
+  std::vector<ListCuller> cullers;
+  for (const EyeBuffers& eye : eyes_)
+    cullers.emplace_back(eye.camera, plan.window > 0 ? plan : FramePlan{.window_end = eye.camera});
+  const auto is_seen = [&](const Cluster& cluster) {
+    for (std::size_t i = 0; i < eyes_.size(); ++i)
+      if (!cullers[i].outside(cluster) && !eyes_[i].occlusion.hides(cluster)) return true;
+    return false;
+  };
   const bool cull = settings_.pipeline != Pipeline::vanilla;
   clusters_.clear();
-  for (std::size_t c = 0; c < clusters.size(); ++c) {
-    if (cull && (culler.outside(clusters[c]) || occlusion_.hides(clusters[c]))) continue;
-    clusters_.push_back(static_cast<std::uint32_t>(c));
-  }
+  for (std::size_t c = 0; c < clusters.size(); ++c)
+    if (!cull || is_seen(clusters[c])) clusters_.push_back(static_cast<std::uint32_t>(c));
   shares_.assign(clusters_.size(), 1.0f);
+}
+
+/// Whether the last frame shows that a cluster is hidden from all eyes.
+bool CpuView::is_hidden(const Cluster& bounds) const {
+  return std::ranges::all_of(eyes_,
+                             [&](const EyeBuffers& eye) { return eye.occlusion.hides(bounds); });
 }
 
 /// Finds the clusters of a scene in pages, and how much of each is drawn.
@@ -171,8 +200,9 @@ void CpuView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
   shares_.clear();
   nodes_.clear();
   CutParts parts{.part = CutParts::Part::drawn};
-  if (occlusion_.limits())
-    parts.hides = [this](const Cluster& bounds) { return occlusion_.hides(bounds); };
+  if (std::ranges::all_of(eyes_,
+                          [](const EyeBuffers& eye) { return bool(eye.occlusion.limits()); }))
+    parts.hides = [this](const Cluster& bounds) { return is_hidden(bounds); };
   const Cut cut = table.cut(paged_->cameras(), request.detail_px, paged_->now_s(), parts);
   const TreeShape& shape = table.shape();
   const std::span<const Cluster> clusters = scene_->store().clusters();
@@ -185,7 +215,7 @@ void CpuView::cut_tree(const FrameRequest& request, const FramePlan& plan) {
   for (std::size_t i = 0; i < drawn; ++i) {
     if (i + ahead < drawn) __builtin_prefetch(&clusters[cluster_at(i + ahead)]);
     const std::uint32_t c = cluster_at(i);
-    if (occlusion_.hides(clusters[c])) continue;
+    if (is_hidden(clusters[c])) continue;
     clusters_.push_back(c);
     shares_.push_back(cut.drawn[i].share);
     nodes_.push_back(cut.drawn[i].node);
@@ -201,48 +231,73 @@ std::size_t CpuView::segments() const {
 }
 
 SplatTable CpuView::table(const FramePlan& plan) const {
-  return {splats_, plan.window > 0 ? paths_.data() : nullptr, counts_, occlusion_.limits()};
+  SplatTable table{splats_, plan.window > 0 ? paths_.data() : nullptr, counts_,
+                   eyes_.front().occlusion.limits()};
+  if (eyes_.size() > 1)
+    table.second = {clusters_.size(), tiles_.y, eyes_.back().occlusion.limits()};
+  return table;
 }
 
-ClusterColours CpuView::colours_of(std::size_t rank, const Camera& camera) {
+/// Those of the second eye are below those of the first.
+glm::ivec2 CpuView::tiles_of_all() const {
+  return tiles_ * glm::ivec2(1, static_cast<int>(eyes_.size()));
+}
+
+/// `head`: where the colours are seen from.
+ClusterColours CpuView::colours_of(std::size_t rank, const Camera& head) {
   if (!colours_) return {nullptr, nullptr};
   const std::uint32_t cluster = clusters_[rank];
   const std::uint64_t page = paged_ ? paged_->table().shape().page_of(nodes_[rank]) : 0;
-  return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster],
-                              colour_eye(camera));
+  return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster], colour_eye(head));
+}
+
+/// Whether all eyes may see a cluster's colours from the middle of the head: where a View that
+/// reuses colours would do so after such a step.
+bool CpuView::share_colours(const Cluster& bounds, const Camera& head) const {
+  return colours_ && std::ranges::all_of(eyes_, [&](const EyeBuffers& eye) {
+           return colours_hold(bounds, colour_eye(head), colour_eye(eye.camera));
+         });
 }
 
 /// Projects the visible clusters in `shares` and calls done(share, rank) after each.
 template <class Done>
-void CpuView::project(const Camera& camera, const FramePlan& plan, std::size_t shares,
+void CpuView::project(const Camera& head, const FramePlan& plan, std::size_t shares,
                       const Done& done) {
   const bool sweeps = plan.window > 0;
   const std::size_t ranks = clusters_.size(), slots = ranks * cluster_size;
-  grow(splats_, slots);
+  grow(splats_, slots * eyes_.size());
   if (sweeps) grow(paths_, slots);
   if (sweeps) grow(members_, ranks);
   summaries_.resize(ranks);
-  counts_.resize(ranks);
+  counts_.resize(ranks * eyes_.size());
   // A key frame of the paper without a window is an exact frame.
   const bool is_exact = settings_.pipeline == Pipeline::paper && !sweeps;
-  const float min_depth = speculation_min_depth(settings_.speculation, camera.near_z);
+  const float min_depth = speculation_min_depth(settings_.speculation, head.near_z);
+  const glm::vec3 middle = colour_eye(head);
+  const EyeBuffers& left = eyes_.front();
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
-      summaries_[rank] = scene_->kernels.project_cluster(
-          {.scene = &scene_->store(),
-           .camera = &camera,
-           .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
-           .cluster = clusters_[rank],
-           .splats = splats_.data() + first,
-           .min_depth = min_depth,
-           .share = shares_[rank],
-           .limits = occlusion_.limits(),
-           .colours = colours_of(rank, camera),
-           .window_end = &plan.window_end,
-           .paths = sweeps ? paths_.data() + first : nullptr,
-           .members = sweeps ? &members_[rank] : nullptr});
+      const bool shared = share_colours(scene_->store().clusters()[clusters_[rank]], head);
+      ProjectTask task{
+          .scene = &scene_->store(),
+          .camera = &left.camera,
+          .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
+          .cluster = clusters_[rank],
+          .splats = splats_.data() + first,
+          .min_depth = min_depth,
+          .share = shares_[rank],
+          .limits = left.occlusion.limits(),
+          .colours = shared ? colours_of(rank, head) : ClusterColours{nullptr, nullptr},
+          .window_end = &plan.window_end,
+          .paths = sweeps ? paths_.data() + first : nullptr,
+          .members = sweeps ? &members_[rank] : nullptr};
+      if (eyes_.size() > 1)
+        task.second = {&eyes_.back().camera, splats_.data() + slots + first,
+                       eyes_.back().occlusion.limits(), shared ? &middle : nullptr};
+      summaries_[rank] = scene_->kernels.project_cluster(task);
       counts_[rank] = summaries_[rank].visible;
+      if (eyes_.size() > 1) counts_[ranks + rank] = summaries_[rank].visible_to_second;
       done(share, rank);
     }
   });
@@ -254,7 +309,9 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
   const std::span<const std::uint32_t> tiles = lists_.tiles_by_length();
   scene_->pool->parallel_for(tiles.size(), [&](std::size_t i) {
     const auto index = static_cast<int>(tiles[i]);
-    const glm::ivec2 tile(index % tiles_.x, index / tiles_.x);
+    const int row = index / tiles_.x;
+    const glm::ivec2 tile(index % tiles_.x, row % tiles_.y);
+    EyeBuffers& eye = eyes_[static_cast<std::size_t>(row / tiles_.y)];
     const std::uint64_t blended =
         scene_->kernels.blend_tile({.splats = splats_.data(),
                                     .list = lists_.list(tiles[i]),
@@ -263,12 +320,28 @@ std::uint64_t CpuView::blend(const FrameRequest& request) {
                                     .cull_blocks = settings_.pipeline != Pipeline::vanilla,
                                     .fills = fills,
                                     .count_pairs = settings_.count_pairs,
-                                    .image = &image_,
-                                    .ends = fills ? occlusion_.ends_of_tile(tile) : PartEnds{},
-                                    .depths = depths_.of_tile(tile)});
+                                    .image = &eye.picture,
+                                    .ends = fills ? eye.occlusion.ends_of_tile(tile) : PartEnds{},
+                                    .depths = eye.depths.of_tile(tile)});
     if (settings_.count_pairs) pairs += blended;
   });
   return pairs;
+}
+
+/// The grids of the eyes side by side.
+DepthGrid CpuView::finish_depths(glm::ivec2 cells) {
+  if (eyes_.size() == 1) return eyes_.front().depths.finish(*scene_->pool);
+  inverse_depths_.resize(static_cast<std::size_t>(cells.x) * static_cast<std::size_t>(cells.y));
+  auto to = inverse_depths_.begin();
+  for (EyeBuffers& eye : eyes_) {
+    const DepthGrid grid = eye.depths.finish(*scene_->pool);
+    const auto columns = static_cast<std::size_t>(grid.cells.x);
+    for (std::size_t row = 0; row < static_cast<std::size_t>(grid.cells.y); ++row)
+      std::ranges::copy(grid.inverse_depths.subspan(row * columns, columns),
+                        to + static_cast<std::ptrdiff_t>(row * static_cast<std::size_t>(cells.x)));
+    to += grid.cells.x;
+  }
+  return {cells, inverse_depths_};
 }
 
 std::vector<std::uint32_t> CpuView::tile_loads() const {
@@ -280,10 +353,12 @@ std::vector<std::uint32_t> CpuView::tile_loads() const {
 
 std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
+  std::size_t of_eyes = 0;
+  for (const EyeBuffers& eye : both_eyes_)
+    of_eyes += eye.occlusion.memory_bytes() + eye.depths.memory_bytes();
   return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         occlusion_.memory_bytes() + depths_.memory_bytes() + bytes(clusters_) + bytes(shares_) +
-         bytes(nodes_) + bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) +
-         bytes(paths_);
+         of_eyes + bytes(inverse_depths_) + bytes(clusters_) + bytes(shares_) + bytes(nodes_) +
+         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
 }
 
 }  // namespace catgs

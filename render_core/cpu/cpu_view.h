@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "render_core/base/thread_pool.h"
@@ -46,38 +48,52 @@ class CpuView final : public View {
   bool outdated() const override { return paged_ && paged_->outdated(); }
 
  private:
+  /// One of the eyes that a frame is drawn for.
+  struct EyeBuffers {
+    Camera camera;
+    ImagePlanes picture;  // in image_
+    Occlusion occlusion;  // Pipeline::catgs
+    DepthSampler depths;
+  };
+
   FrameView draw(const FrameRequest& request, const FramePlan& plan);
-  void draw_boxes(const Camera& camera, FrameStats& stats);
+  void begin_eyes(const FrameRequest& request);
+  void draw_boxes(const FrameRequest& request, FrameStats& stats);
   void draw_lists(const FrameRequest& request, const FramePlan& plan, FrameStats& stats);
   void draw_cached_lists(const Camera& camera, FrameStats& stats);
-  void cull_clusters(const Camera& camera, const FramePlan& plan);
+  void cull_clusters(const FramePlan& plan);
   void cut_tree(const FrameRequest& request, const FramePlan& plan);
+  [[nodiscard]] bool is_hidden(const Cluster& bounds) const;
   template <class Done>
-  void project(const Camera& camera, const FramePlan& plan, std::size_t shares, const Done& done);
+  void project(const Camera& head, const FramePlan& plan, std::size_t shares, const Done& done);
   std::uint64_t blend(const FrameRequest& request);
+  [[nodiscard]] DepthGrid finish_depths(glm::ivec2 cells);
   void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(const FramePlan& plan) const;
-  ClusterColours colours_of(std::size_t rank, const Camera& camera);
+  [[nodiscard]] glm::ivec2 tiles_of_all() const;
+  ClusterColours colours_of(std::size_t rank, const Camera& head);
+  [[nodiscard]] bool share_colours(const Cluster& bounds, const Camera& head) const;
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
   FrameDriver driver_;
-  glm::ivec2 tiles_{0};  // of the picture
+  std::array<EyeBuffers, 2> both_eyes_;
+  std::span<EyeBuffers> eyes_;  // those of the frame
+  glm::ivec2 tiles_{0};         // of an eye's picture
   HostImage image_;
   std::vector<std::uint32_t> clusters_;    // [rank]: those that may be visible
   std::vector<float> shares_;              // [rank]: the part of the cluster that is drawn
   std::vector<NodeId> nodes_;              // [rank]: of a scene in pages
   std::vector<ClusterMembers> members_;    // [rank]: their visible Gaussians
   std::vector<ClusterSummary> summaries_;  // [rank]
-  std::vector<std::uint32_t> counts_;      // [rank]: visible Gaussians
+  std::vector<std::uint32_t> counts_;      // [eye][rank]: visible Gaussians
   std::vector<Splat> splats_;              // [slot], see SplatTable
   std::vector<SplatPath> paths_;           // [slot]
   std::optional<ColourCache> colours_;
   TileLists lists_;
-  Occlusion occlusion_;  // Pipeline::catgs
-  DepthSampler depths_;
-  float mean_inverse_depth_ = 0.0f;  // of the last frame
+  std::vector<float> inverse_depths_;  // of both eyes
+  float mean_inverse_depth_ = 0.0f;    // of the last frame
   std::optional<PagedFrame> paged_;
 };
 

@@ -57,6 +57,15 @@ struct ClusterColours {
   ClusterMembers* shaded;  // the colours that hold
 };
 
+/// The right eye of a frame with two. It differs from the left one in its projection and in its
+/// position across the view axis, so the two share depths.
+struct SecondEye {
+  const Camera* camera = nullptr;  // null: the frame has one eye
+  Splat* splats = nullptr;         // as those of the first eye
+  DepthLimits limits{};
+  const glm::vec3* colours_from = nullptr;  // of both eyes, world; null: each sees its own colours
+};
+
 /// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,
 /// which has room for the whole cluster.
 struct ProjectTask {
@@ -76,6 +85,7 @@ struct ProjectTask {
   const Camera* window_end = nullptr;
   SplatPath* paths = nullptr;         // as splats
   ClusterMembers* members = nullptr;  // the visible ones
+  SecondEye second{};                 // not with a window
 };
 
 /// Projects and shades `members` of a cluster like project_cluster(), but without culling: the n-th
@@ -98,6 +108,7 @@ struct ClusterSummary {
   float nearest_depth = std::numeric_limits<float>::infinity();
   float inverse_depth_sum = 0.0f;
   float longest_path_px = 0.0f;
+  std::uint32_t visible_to_second = 0;  // splats written for the second eye
 };
 
 /// Neighbouring tiles of one row that list the same splat.
@@ -112,6 +123,7 @@ struct ListTask {
   const SplatPath* paths;  // as splats; null: ellipses are listed, not trails
   std::uint32_t first_slot;
   DepthLimits limits;  // tiles that a splat is behind do not list it
+  int first_row = 0;   // of the splats' tiles in the lists
 };
 
 /// Pixels are blended in blocks of 4x4, which are culled as one: a register where that is wide
@@ -132,7 +144,7 @@ struct BlendTask {
   // pixel is finished before transmittance_min.
   bool fills;
   bool count_pairs;
-  const HostImage* image;
+  const ImagePlanes* image;
   PartEnds ends;    // of the tile, to be noted where it fills
   PartEnds depths;  // of the tile, to be noted: inverse, see DepthGrid
 };

@@ -101,7 +101,7 @@ HWY_INLINE void copy_rows(const T* rows, glm::ivec2 inside_px, std::size_t per_p
   }
 }
 
-inline void write_rgb(const BlockPixels& pixels, glm::ivec2 origin_px, const HostImage& image) {
+inline void write_rgb(const BlockPixels& pixels, glm::ivec2 origin_px, const ImagePlanes& image) {
   const hn::ScalableTag<float> d;
   alignas(64) float rgb[3 * block_px];
   for (int at = 0; at < block_px; at += lanes)
@@ -129,7 +129,7 @@ HWY_INLINE void average_2x2(const float* block, float* out) {
   }
 }
 
-inline void write_i420(const BlockPixels& pixels, glm::ivec2 origin_px, const HostImage& image) {
+inline void write_i420(const BlockPixels& pixels, glm::ivec2 origin_px, const ImagePlanes& image) {
   constexpr int samples = block_px / 4, samples_across = block_side_px / 2;
   using L = Lanes<hn::CappedTag<float, samples>>;
   std::uint8_t luma[block_px], chroma[2][samples];

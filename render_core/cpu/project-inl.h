@@ -79,6 +79,77 @@ HWY_INLINE void write_paths(const Sweep<Floats>& s, const Floats& log2_opacity, 
   }
 }
 
+/// An eye of a task, and the splats that are written for it.
+struct TaskEye {
+  const CameraModel<Floats>* camera;
+  Vec3<Floats> colours_from;
+  DepthLimits limits;
+  Splat* splats;
+  std::uint32_t visible;
+};
+
+/// The eyes of a task: `count` of them.
+struct TaskEyes {
+  CameraModel<Floats> second_camera;
+  TaskEye eyes[2];
+  int count;
+  bool share_colours;  // what the first eye sees is what the second sees
+};
+
+/// `camera`: of the first eye.
+inline void find_eyes(const ProjectTask& task, const CameraModel<Floats>& camera, TaskEyes& out) {
+  const SecondEye& second = task.second;
+  out.eyes[0] = {&camera, camera.eye, task.limits, task.splats, 0};
+  out.count = second.camera == nullptr ? 1 : 2;
+  out.share_colours = second.colours_from != nullptr;
+  if (out.count == 1) return;
+  out.second_camera = convert<Floats>(make_camera_model(*second.camera));
+  out.eyes[1] = {&out.second_camera, out.second_camera.eye, second.limits, second.splats, 0};
+  if (!out.share_colours) return;
+  const glm::vec3& from = *second.colours_from;
+  for (TaskEye& eye : out.eyes) eye.colours_from = {Floats(from.x), Floats(from.y), Floats(from.z)};
+}
+
+/// Some Gaussians before they are projected.
+struct UnprojectedGaussians {
+  std::size_t first;
+  Vec3<Floats> mean;
+  CovarianceFactor<Floats> factor;
+  Floats depth, log2_opacity;
+  FloatMask candidates;  // those that may be drawn
+};
+
+/// Projects Gaussians for an eye. Fills in all of `look` but the colour. Returns which are visible,
+/// a bit each; where none is, what is filled in says nothing. `end_camera`: of a window.
+template <Pipeline pipeline>
+HWY_INLINE std::uint32_t project_for(const SceneStore& scene, const TaskEye& eye,
+                                     const CameraModel<Floats>& end_camera,
+                                     const Vec2<Floats>& last_px, const UnprojectedGaussians& g,
+                                     Sweep<Floats>& s, SplatLook& look, SplatBox& box) {
+  constexpr bool sweeps = pipeline == Pipeline::paper;
+  if constexpr (sweeps) {
+    s = sweep(*eye.camera, end_camera, g.mean, g.factor, g.depth);
+  } else {
+    s.shape = project(*eye.camera, g.mean, g.factor, g.depth);
+  }
+  look.log2_opacity = look_of(scene, g.log2_opacity, s.shape);
+  // On a path the footprint changes; that with all of the opacity holds it.
+  const Floats all_reach = reach_of(sweeps ? g.log2_opacity : look.log2_opacity);
+  const Floats reach = max(all_reach, Floats(0.0));
+  box = box_of<pipeline>(s, reach, last_px);
+  const auto hit = g.candidates & (all_reach >= Floats(0.0)) & box.columns.hit & box.rows.hit;
+  std::uint32_t hits = bits(hit);
+  if (hits != 0 && eye.limits)
+    hits &= ~bits(is_hidden(eye.limits, s.shape, reach, g.depth, last_px));
+  if (hits == 0) return 0;
+  look.centre_px = s.shape.centre_px;
+  look.w = whitening(s.shape);
+  look.depth = g.depth;
+  look.scene_order = load_index(scene, g.first);
+  box.rightmost_y = rightmost_y(look.w, reach);
+  return hits;
+}
+
 template <Pipeline pipeline>
 ClusterSummary project_cluster_of(const ProjectTask& task) {
   constexpr bool sweeps = pipeline == Pipeline::paper;
@@ -86,6 +157,8 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   const ProjectionContext context = make_context(*task.camera);
   const Vec2<Floats> last_px{Floats(static_cast<float>(task.camera->size_px.x - 1)),
                              Floats(static_cast<float>(task.camera->size_px.y - 1))};
+  TaskEyes eyes;
+  find_eyes(task, context.camera, eyes);
   CameraModel<Floats> end_camera;
   if constexpr (sweeps) {
     end_camera = convert<Floats>(make_camera_model(*task.window_end));
@@ -93,57 +166,50 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   }
   const std::size_t begin = task.cluster * cluster_size;
   const std::size_t end = std::min(scene.size(), begin + cluster_size);
-  std::uint32_t visible = 0;
   Extremes extremes;
   for (std::size_t i = begin; i < end; i += Floats::count) {
-    const Floats depth = depths(context, scene, i);
-    const Floats log2_opacity = load_log2_opacity(scene, i, task.share);
-    Floats reach = max(reach_of(log2_opacity), Floats(0.0));
-    const auto opaque = reach_of(log2_opacity) >= Floats(0.0);
-    const Vec3<Floats> mean = load_mean(scene, i);
-    Floats deepest = depth;
-    if constexpr (sweeps) deepest = max(depth, view_depth(end_camera, mean));
-    const auto candidates = opaque & (deepest > context.near_z) & is_kept(context.camera, mean);
-    if (none(candidates)) continue;
+    UnprojectedGaussians g;
+    g.first = i;
+    g.depth = depths(context, scene, i);
+    g.log2_opacity = load_log2_opacity(scene, i, task.share);
+    g.mean = load_mean(scene, i);
+    Floats deepest = g.depth;
+    if constexpr (sweeps) deepest = max(g.depth, view_depth(end_camera, g.mean));
+    g.candidates = (reach_of(g.log2_opacity) >= Floats(0.0)) & (deepest > context.near_z) &
+                   is_kept(context.camera, g.mean);
+    if (none(g.candidates)) continue;
+    g.factor = load_factor(scene, i);
 
-    const CovarianceFactor<Floats> factor = load_factor(scene, i);
+    std::uint32_t hits_of_any = 0;
     Sweep<Floats> s;
-    if constexpr (sweeps) {
-      s = sweep(context.camera, end_camera, mean, factor, depth);
-    } else {
-      s.shape = project(context.camera, mean, factor, depth);
-    }
     SplatLook look;
-    look.log2_opacity = look_of(scene, log2_opacity, s.shape);
-    // On a path the footprint changes; that with all of the opacity holds it.
-    if constexpr (!sweeps) reach = max(reach_of(look.log2_opacity), Floats(0.0));
-    SplatBox box = box_of<pipeline>(s, reach, last_px);
-    const auto shown = candidates & (sweeps ? opaque : reach_of(look.log2_opacity) >= Floats(0.0));
-    const auto hit = shown & box.columns.hit & box.rows.hit;
-    std::uint32_t hits = bits(hit);
-    if (hits != 0 && task.limits)
-      hits &= ~bits(is_hidden(task.limits, s.shape, reach, depth, last_px));
-    if (hits == 0) continue;
-
-    look.centre_px = s.shape.centre_px;
-    look.w = whitening(s.shape);
-    look.colour = colour_of(task.colours, scene, i, i - begin, mean, context.camera.eye);
-    look.depth = depth;
-    look.scene_order = load_index(scene, i);
-    box.rightmost_y = rightmost_y(look.w, reach);
-    const auto counted =
-        mask_of_bits<hn::ScalableTag<float>>(hits) & (depth > Floats(task.min_depth));
-    extremes.add_depths(counted, depth);
-    if constexpr (sweeps) {
-      extremes.add_paths(counted, s.displacement);
-      write_paths(s, log2_opacity, reach, box.half_extent_x, hits, task.paths + visible);
-      (*task.members)[(i - begin) / 32] |= hits << ((i - begin) % 32);
-      hide(look, depth > context.near_z, context.near_z);
+    for (int e = 0; e < eyes.count; ++e) {
+      TaskEye& eye = eyes.eyes[e];
+      SplatBox box;
+      const std::uint32_t hits =
+          project_for<pipeline>(scene, eye, end_camera, last_px, g, s, look, box);
+      if (hits == 0) continue;
+      if (hits_of_any == 0 || !eyes.share_colours)
+        look.colour = colour_of(task.colours, scene, i, i - begin, g.mean, eye.colours_from);
+      hits_of_any |= hits;
+      if constexpr (sweeps) {
+        const Floats reach = max(reach_of(g.log2_opacity), Floats(0.0));
+        write_paths(s, g.log2_opacity, reach, box.half_extent_x, hits, task.paths + eye.visible);
+        (*task.members)[(i - begin) / 32] |= hits << ((i - begin) % 32);
+        hide(look, g.depth > context.near_z, context.near_z);
+      }
+      write_splats(look, box, hits, eye.splats + eye.visible);
+      eye.visible += static_cast<std::uint32_t>(std::popcount(hits));
     }
-    write_splats(look, box, hits, task.splats + visible);
-    visible += static_cast<std::uint32_t>(std::popcount(hits));
+    if (hits_of_any == 0) continue;
+    const auto counted =
+        mask_of_bits<hn::ScalableTag<float>>(hits_of_any) & (g.depth > Floats(task.min_depth));
+    extremes.add_depths(counted, g.depth);
+    if constexpr (sweeps) extremes.add_paths(counted, s.displacement);
   }
-  return extremes.summary(visible);
+  ClusterSummary summary = extremes.summary(eyes.eyes[0].visible);
+  if (eyes.count > 1) summary.visible_to_second = eyes.eyes[1].visible;
+  return summary;
 }
 
 inline ClusterSummary project_cluster(const ProjectTask& task) {

@@ -71,7 +71,8 @@ void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdK
                        segment.runs.end());
   }
   const std::span added = std::span(segment.runs).subspan(known);
-  for (const TileRun& run : added) {
+  for (TileRun& run : added) {
+    run.row = static_cast<std::uint16_t>(run.row + task.first_row);
     std::uint32_t* const row = segment.positions.data() + run.row * tiles_across_;
     for (int column = run.begin; column < run.end; ++column) ++row[column];
     segment.entries += run.end - run.begin;
@@ -124,7 +125,7 @@ void TileLists::list_nearest(const SplatTable& table, const SimdKernels& kernels
 /// The nearest splat to be left out, together with all behind it, so that the entries of the nearer
 /// splats (entries_of_slot_) stay within the bound.
 TileLists::DepthOrder TileLists::find_first_left_out(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts, limits] = table;
+  const auto& [splats, paths, counts, limits, second] = table;
   by_depth_.clear();
   for (std::size_t rank = 0; rank < counts.size(); ++rank)
     for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank]; ++slot)
@@ -166,7 +167,7 @@ void TileLists::sort(std::span<const Splat> splats, ThreadPool& pool) {
 void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 tiles, std::uint64_t max_entries,
                               ThreadPool& pool) {
   assert(tiles.x > 0 && tiles.y > 0);
-  const auto& [splats, paths, counts, limits] = table;
+  const auto& [splats, paths, counts, limits, second] = table;
   const auto tile_count = static_cast<std::size_t>(tiles.x) * static_cast<std::size_t>(tiles.y);
   max_entries_ = max_entries;
   first_left_out_ = nothing_left_out;
@@ -182,12 +183,13 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 tiles, std::ui
 
   pool.parallel_for(counts.size(), [&](std::size_t rank) {
     CodedIndex* key = keys_.data() + key_offsets_[rank];
+    const int first_row = table.of_cluster(rank).first_row;
     for (std::size_t slot = rank * cluster_size; slot < rank * cluster_size + counts[rank];
          ++slot) {
       if (entries_of_slot_[slot] == 0) continue;
       const Splat& s = splats[slot];
       const std::uint64_t depth = std::bit_cast<std::uint32_t>(s.depth);
-      for (int y = s.tile_y; y < s.tile_end_y; ++y)
+      for (int y = first_row + s.tile_y; y < first_row + s.tile_end_y; ++y)
         for (int x = s.tile_x; x < s.tile_end_x; ++x)
           *key++ = {static_cast<std::uint64_t>(y * tiles.x + x) << 32 | depth,
                     static_cast<std::uint32_t>(slot)};
@@ -208,7 +210,7 @@ void TileLists::build_by_keys(const SplatTable& table, glm::ivec2 tiles, std::ui
 /// Counts the keys of each splat that is not left out (entries_of_slot_) and finds the first key of
 /// each cluster (key_offsets_). Returns the sum of the counts.
 std::uint64_t TileLists::count_keys(const SplatTable& table, ThreadPool& pool) {
-  const auto& [splats, paths, counts, limits] = table;
+  const auto& [splats, paths, counts, limits, second] = table;
   entries_of_slot_.resize(splats.size());
   key_offsets_.resize(counts.size());
   pool.parallel_for(counts.size(), [&](std::size_t rank) {

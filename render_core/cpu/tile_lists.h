@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cassert>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -15,18 +16,28 @@
 
 namespace catgs {
 
-/// The splats of a frame: [cluster rank * cluster_size + i], i < counts[rank]. This index is a
-/// splat's slot.
+/// The splats of a frame: [rank * cluster_size + i], i < counts[rank]. This index is a splat's
+/// slot. The ranks of the second eye, if there is one, follow those of the first, as its rows of
+/// tiles do in the lists.
 struct SplatTable {
+  struct Second {
+    std::size_t first_rank = std::numeric_limits<std::size_t>::max();
+    int first_row = 0;  // of tiles
+    DepthLimits limits{};
+  };
+
   std::span<const Splat> splats;
   const SplatPath* paths;  // [slot]; null: ellipses are listed, not trails
   std::span<const std::uint32_t> counts;
   DepthLimits limits;
+  Second second{};
 
   [[nodiscard]] ListTask of_cluster(std::size_t rank) const {
     const std::size_t first = rank * cluster_size;
+    const bool is_second = rank >= second.first_rank;
     return {splats.subspan(first, counts[rank]), paths == nullptr ? nullptr : paths + first,
-            static_cast<std::uint32_t>(first), limits};
+            static_cast<std::uint32_t>(first), is_second ? second.limits : limits,
+            is_second ? second.first_row : 0};
   }
 };
 
@@ -36,8 +47,8 @@ struct SplatTable {
 /// entries are counted.
 class TileLists {
  public:
-  /// Starts lists for columns x rows of tiles. Splats are added in `segments` shares, in parallel;
-  /// each share belongs to one thread at a time.
+  /// Starts lists for columns x rows of tiles: those of all eyes. Splats are added in `segments`
+  /// shares, in parallel; each share belongs to one thread at a time.
   void begin(glm::ivec2 tiles, std::size_t segments, std::uint64_t max_entries);
 
   /// Lists splats for the tiles whose rectangle of pixel centres meets their ellipse alpha >=

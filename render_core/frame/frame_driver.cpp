@@ -59,9 +59,10 @@ RenderStatus FrameDriver::render(const FrameRequest& request, FrameView& frame, 
   }
 }
 
-/// Frames are drawn each for itself in pipelines without groups, and with parallel rays.
+/// Frames are drawn each for itself in pipelines without groups, with parallel rays, and for two
+/// eyes.
 FramePlan FrameDriver::plan(const FrameRequest& request) {
-  if (!groups_frames_ || request.camera.orthographic) {
+  if (!groups_frames_ || request.camera.orthographic || request.stereo) {
     groups_.forget();
     return {.window_end = request.camera};
   }

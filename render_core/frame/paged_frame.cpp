@@ -15,12 +15,13 @@ PagedFrame::PagedFrame(PagedTree& tree, const ViewSettings& settings)
 
 void PagedFrame::begin(const FrameRequest& request, const FramePlan& plan) {
   keeps_pages_ = plan.window > 0;
-  cameras_ = {request.camera};
+  cameras_ = cameras_of(request);
   if (plan.window > 0) cameras_.push_back(plan.window_end);
   ViewDemand demand{cameras_, request.detail_px, request.waits_for_pages};
   if (request.soon) {
-    demand.cameras.push_back(request.camera);
-    demand.cameras.back().world_from_camera = *request.soon;
+    FrameRequest ahead = request;
+    ahead.camera.world_from_camera = *request.soon;
+    for (const Camera& camera : cameras_of(ahead)) demand.cameras.push_back(camera);
   }
   table_.reset();
   watch_->look(std::move(demand));

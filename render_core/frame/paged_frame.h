@@ -23,7 +23,8 @@ class PagedFrame {
   [[nodiscard]] const PageTable& table() const { return *table_; }
   /// The frame's time, as PageInSlot::shown_since_s.
   [[nodiscard]] double now_s() const { return now_s_; }
-  /// The cameras that the frame draws for: now, and at the end of its window if it has one.
+  /// The cameras that the frame draws for: those of its eyes now, and the one at the end of its
+  /// window if it has one.
   [[nodiscard]] const std::vector<Camera>& cameras() const { return cameras_; }
 
   /// Call after each frame. Fills in what the statistics say of pages. The pages of a frame that no

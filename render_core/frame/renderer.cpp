@@ -18,19 +18,51 @@ std::string find_mistake(const Pose& pose, const std::string& name) {
   return {};
 }
 
-std::string find_mistake(const FrameRequest& request, PixelFormat format) {
-  const Camera& camera = request.camera;
-  const glm::ivec2 size = camera.size_px;
-  if (size.x < 1 || size.y < 1 || size.x > max_image_side_px || size.y > max_image_side_px)
-    return "image size " + std::to_string(size.x) + "x" + std::to_string(size.y) +
-           " is outside 1x1…" + std::to_string(max_image_side_px) + " a side";
-  if (format == PixelFormat::i420 && (size.x % 2 != 0 || size.y % 2 != 0))
-    return "i420 needs even sides, not " + std::to_string(size.x) + "x" + std::to_string(size.y);
+std::string text_of(glm::ivec2 size) {
+  return std::to_string(size.x) + "x" + std::to_string(size.y);
+}
+
+std::string find_mistake_in_lens(const Camera& camera) {
   const glm::vec2 focal = camera.focal_px;
   if (!(focal.x > 0 && focal.y > 0 && std::isfinite(focal.x) && std::isfinite(focal.y)))
     return "focal length must be positive";
   const glm::vec2 centre = camera.principal_point_px;
   if (!std::isfinite(centre.x) || !std::isfinite(centre.y)) return "principal point is not finite";
+  return {};
+}
+
+std::string find_mistake_in_eyes(const FrameRequest& request) {
+  const Camera& head = request.camera;
+  if (head.orthographic) return "two eyes have no orthographic picture";
+  if (head.crop != Crop{}) return "pictures of two eyes have no parts";
+  if (head.size_px.x % 2 != 0)
+    return "an image of two eyes has an even width, not " + std::to_string(head.size_px.x);
+  if (request.depth_cells.x % 2 != 0)
+    return "a depth grid of two eyes has even columns, not " +
+           std::to_string(request.depth_cells.x);
+  static_assert(max_eye_tangent == 10.0f, "the text below says so");
+  const Stereo& eyes = *request.stereo;
+  for (std::size_t i = 0; i < eyes.size(); ++i)
+    if (!is_valid(eyes[i]))
+      return std::string(i == 0 ? "left" : "right") +
+             " eye: its offset is too large, or its tangents are not left < right and up < down in "
+             "-10…10";
+  return {};
+}
+
+std::string find_mistake(const FrameRequest& request, PixelFormat format) {
+  const Camera& camera = request.camera;
+  const glm::ivec2 size = camera.size_px;
+  if (size.x < 1 || size.y < 1 || size.x > max_image_side_px || size.y > max_image_side_px)
+    return "image size " + text_of(size) + " is outside 1x1…" + std::to_string(max_image_side_px) +
+           " a side";
+  if (std::string bad =
+          request.stereo ? find_mistake_in_eyes(request) : find_mistake_in_lens(camera);
+      !bad.empty())
+    return bad;
+  const glm::ivec2 eye_size = request.stereo ? size / glm::ivec2(2, 1) : size;
+  if (format == PixelFormat::i420 && (eye_size.x % 2 != 0 || eye_size.y % 2 != 0))
+    return "i420 needs even sides, not " + text_of(eye_size);
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
   const ClipBox& clip = camera.clip;
   for (int i = 0; i < 3; ++i)
@@ -44,8 +76,8 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
   const glm::ivec2 cells = request.depth_cells;
   if (cells != glm::ivec2(0) &&
       (cells.x < 1 || cells.y < 1 || cells.x > max_depth_cells || cells.y > max_depth_cells))
-    return "depth grid " + std::to_string(cells.x) + "x" + std::to_string(cells.y) +
-           " is outside 1x1…" + std::to_string(max_depth_cells) + " a side";
+    return "depth grid " + text_of(cells) + " is outside 1x1…" + std::to_string(max_depth_cells) +
+           " a side";
   std::string mistake = find_mistake(camera.world_from_camera, "camera");
   if (mistake.empty() && request.forecast) {
     mistake = find_mistake(request.forecast->world_from_camera, "forecast");
@@ -54,6 +86,13 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
 }
 
 }  // namespace
+
+std::vector<Camera> cameras_of(const FrameRequest& request) {
+  if (!request.stereo) return {request.camera};
+  std::vector<Camera> cameras;
+  for (const Eye& eye : *request.stereo) cameras.push_back(eye_camera(request.camera, eye));
+  return cameras;
+}
 
 RenderStatus check_request(const FrameRequest& request, PixelFormat format) {
   std::string mistake = find_mistake(request, format);

@@ -14,6 +14,7 @@
 
 #include "render_core/frame/depth_grid.h"
 #include "render_core/math/camera.h"
+#include "render_core/math/stereo.h"
 #include "render_core/motion/frame_groups.h"
 #include "render_core/scene/gaussian_cloud.h"
 #include "render_core/scene/tree/page_figures.h"
@@ -65,7 +66,7 @@ inline constexpr std::array<std::string_view, stage_count> stage_names = {"proje
 
 struct FrameStats {
   FrameKind kind = FrameKind::key;
-  std::uint32_t visible = 0;             // Gaussians that passed culling
+  std::uint32_t visible = 0;             // Gaussians that passed culling, counted for each eye
   std::uint64_t list_entries = 0;        // sum of all tile lists
   std::uint32_t list_max = 0;            // longest tile list
   std::uint64_t overflowed_entries = 0;  // list entries that found no memory and were not drawn
@@ -101,7 +102,13 @@ struct FrameRequest {
   std::optional<Pose> soon{};
   bool waits_for_pages = false;  // the pages that the frame needs are read before it is drawn
   glm::ivec2 depth_cells{0};     // of FrameView::depths; 0: not wanted. The CUDA core: catgs only
+  // Two eyes, side by side in the picture; see eye_camera(). The camera is that of the head, and
+  // all poses are. The columns of depths are even. No sub-frame follows.
+  std::optional<Stereo> stereo{};
 };
+
+/// The cameras that a frame draws: one, or those of both eyes.
+std::vector<Camera> cameras_of(const FrameRequest& request);
 
 struct Plane {
   std::byte* data = nullptr;
@@ -137,7 +144,7 @@ struct ViewSettings {
   bool split_tasks = true;            // CUDA core: long tiles are blended in several parts
 };
 
-/// The check that every core makes first: sizes, focal length, near plane and pose must be in
+/// The check that every core makes first: sizes, focal length, near plane, eyes and pose must be in
 /// range.
 RenderStatus check_request(const FrameRequest& request, PixelFormat format);
 
@@ -149,7 +156,8 @@ class View {
   View& operator=(const View&) = delete;
 
   /// Renders one frame and waits for it. Any image size from 1x1 to max_image_side is accepted and
-  /// may change from frame to frame (i420 needs even sides). On failure `frame` is untouched.
+  /// may change from frame to frame (i420 needs even sides, of each eye). On failure `frame` is
+  /// untouched.
   virtual RenderStatus render(const FrameRequest& request, FrameView& frame) noexcept = 0;
 
   /// Length of each tile's list in the last frame, row by row; empty where the core does not tell.

@@ -122,15 +122,15 @@ struct Pixels {
   FrameStats stats;
 };
 
-Pixels render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
-                     std::span<const glm::ivec2> pixels, ThreadPool& pool) {
+Pixels render_eye(const GaussianCloud& cloud, const Camera& camera, const glm::vec3& background,
+                  std::span<const glm::ivec2> pixels, ThreadPool& pool) {
   using Clock = std::chrono::steady_clock;
   const auto ms_since = [](Clock::time_point start) {
     return std::chrono::duration<float, std::milli>(Clock::now() - start).count();
   };
   Pixels out;
   const auto start = Clock::now();
-  const std::vector<ReferenceSplat> splats = project_all(cloud, request.camera, pool);
+  const std::vector<ReferenceSplat> splats = project_all(cloud, camera, pool);
   out.stats.visible = static_cast<std::uint32_t>(splats.size());
   out.stats.stage_ms[static_cast<std::size_t>(Stage::project)] = ms_since(start);
 
@@ -142,7 +142,7 @@ Pixels render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
   pool.parallel_for((pixels.size() + run - 1) / run, [&](std::size_t task) {
     std::uint64_t blended = 0;
     for (std::size_t i = task * run; i < std::min(pixels.size(), (task + 1) * run); ++i) {
-      const ReferencePixel pixel = render_pixel(splats, pixels[i], request.background, blended);
+      const ReferencePixel pixel = render_pixel(splats, pixels[i], background, blended);
       out.colours[i] = pixel.colour;
       out.half_depths[i] = pixel.half_depth;
     }
@@ -151,6 +151,37 @@ Pixels render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
   out.stats.blended_pairs = pairs;
   out.stats.stage_ms[static_cast<std::size_t>(Stage::blend)] = ms_since(blend_start);
   return out;
+}
+
+void add(const FrameStats& stats, FrameStats& sum) {
+  sum.visible += stats.visible;
+  sum.blended_pairs += stats.blended_pairs;
+  for (std::size_t i = 0; i < stage_count; ++i) sum.stage_ms[i] += stats.stage_ms[i];
+}
+
+/// Each eye is drawn by itself.
+Pixels render_pixels(const GaussianCloud& cloud, const FrameRequest& request,
+                     std::span<const glm::ivec2> pixels, ThreadPool& pool) {
+  Pixels all{std::vector<glm::dvec3>(pixels.size()), std::vector<double>(pixels.size()), {}};
+  int left = 0;
+  for (const Camera& camera : cameras_of(request)) {
+    std::vector<std::size_t> positions;  // of its pixels among all
+    std::vector<glm::ivec2> own;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const glm::ivec2 pixel = pixels[i] - glm::ivec2(left, 0);
+      if (pixel.x < 0 || pixel.x >= camera.size_px.x) continue;
+      positions.push_back(i);
+      own.push_back(pixel);
+    }
+    const Pixels part = render_eye(cloud, camera, request.background, own, pool);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      all.colours[positions[i]] = part.colours[i];
+      all.half_depths[positions[i]] = part.half_depths[i];
+    }
+    add(part.stats, all.stats);
+    left += camera.size_px.x;
+  }
+  return all;
 }
 
 /// The medians of a depth grid. A cell smaller than a pixel has the one around its middle.

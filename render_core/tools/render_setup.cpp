@@ -21,6 +21,8 @@
 namespace catgs {
 namespace {
 
+constexpr float default_eye_distance_m = 0.064f;
+
 double mean_rate_hz(const Trajectory& path) {
   if (path.size() < 2) return 1.0;
   return static_cast<double>(path.size() - 1) * 1e6 /
@@ -149,11 +151,30 @@ void add_frame_options(CLI::App& command, RenderOptions& options) {
       ->capture_default_str();
 }
 
+void add_stereo_options(CLI::App& command, RenderOptions& options) {
+  auto* stereo = command.add_flag(
+      "--stereo", options.stereo,
+      "Draw both eyes side by side, the left one left. --size and the lens are those of an eye, so "
+      "pictures are twice as wide; the path is that of the head");
+  stereo->excludes(command.get_option("--orthographic"));
+  command
+      .add_option("--eye-distance", options.eye_distance,
+                  fmt::format("From eye to eye, world units [{} m, or units where the sidecar does "
+                              "not say how long they are]",
+                              default_eye_distance_m))
+      ->check(CLI::Range(0.0, 1000.0))
+      ->needs(stereo);
+}
+
 FrameRequest RenderSetup::request(std::size_t i) const {
   assert(i < poses.size());
   FrameRequest request;
   request.camera = lenses.empty() ? camera : lenses[i];
   request.camera.world_from_camera = poses[i].world_from_camera;
+  if (eye_distance) {
+    request.stereo = eyes_like(request.camera, *eye_distance);
+    request.camera.size_px.x *= 2;
+  }
   request.background = background;
   request.detail_px = detail_px;
   request.waits_for_pages = true;
@@ -220,6 +241,11 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   setup.cloud = std::make_shared<const GaussianCloud>(std::move(setup.scene.cloud));
   setup.camera = make_lens(options.lens, setup.scene.hints);
   setup.predictor.lever = forecast_lever(setup.camera.near_z);
+  if (options.stereo) {
+    const float metres = setup.scene.hints.about.metres_per_unit;
+    setup.eye_distance =
+        options.eye_distance.value_or(default_eye_distance_m / (metres > 0.0f ? metres : 1.0f));
+  }
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;
   setup.made = setup.tree ? make_renderer(setup.tree, core) : make_renderer(setup.cloud, core);

@@ -29,6 +29,8 @@ struct RenderOptions {
   std::optional<std::uint64_t> seed;
   std::optional<double> duration_s;
   LensOptions lens;
+  bool stereo = false;
+  std::optional<float> eye_distance;  // world units
   std::optional<double> fps;
   std::optional<double> most_fps;  // without `fps`: a trace with more is resampled
   std::string frames;
@@ -47,6 +49,8 @@ struct RenderOptions {
 void add_render_options(CLI::App& command, RenderOptions& options);
 /// The options that name neither scene nor path nor pipeline.
 void add_frame_options(CLI::App& command, RenderOptions& options);
+/// Those of pictures with two eyes.
+void add_stereo_options(CLI::App& command, RenderOptions& options);
 
 /// The options, loaded and checked.
 struct RenderSetup {
@@ -63,10 +67,15 @@ struct RenderSetup {
   std::size_t first = 0;           // number of poses[0] in the whole path
   double fps = 0.0;                // of the path
   std::vector<std::string> names;  // of the frames' pictures, as the path's file has them; or none
-  Camera camera;                   // without the pose; of the first frame
-  std::vector<Camera> lenses;      // one per frame, where the path has several; else empty
+  Camera camera;                   // without the pose; of the first frame; in stereo of each eye
+  std::optional<float> eye_distance;  // world units; none: one eye
+  std::vector<Camera> lenses;         // one per frame, where the path has several; else empty
   glm::vec3 background{0.0f};
 
+  /// Size of the pictures.
+  [[nodiscard]] glm::ivec2 picture_px() const {
+    return camera.size_px * glm::ivec2(eye_distance ? 2 : 1, 1);
+  }
   /// The request for frame i alone, without a forecast; see FrameFeed. It waits for pages.
   [[nodiscard]] FrameRequest request(std::size_t i) const;
   /// Gaussians of the whole scene.

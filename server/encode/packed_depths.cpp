@@ -37,13 +37,14 @@ std::vector<std::byte> deflated(const Codes& bytes) {
 
 }  // namespace
 
-glm::ivec2 depth_cells_of(glm::ivec2 size_px) {
+glm::ivec2 depth_cells_of(glm::ivec2 size_px, int eyes) {
   constexpr double cells = 64.0 * 36.0;
-  const double aspect = static_cast<double>(size_px.x) / size_px.y;
-  const auto side = [](double count) {
-    return std::clamp(static_cast<int>(std::lround(count)), 1, max_depth_cells);
+  const double aspect = static_cast<double>(size_px.x) / eyes / size_px.y;
+  const auto side = [](double count, int most) {
+    return std::clamp(static_cast<int>(std::lround(count)), 1, most);
   };
-  return {side(std::sqrt(cells * aspect)), side(std::sqrt(cells / aspect))};
+  return {eyes * side(std::sqrt(cells * aspect), max_depth_cells / eyes),
+          side(std::sqrt(cells / aspect), max_depth_cells)};
 }
 
 PackedDepths pack(const DepthGrid& grid) {

@@ -20,12 +20,13 @@ struct PackedDepths {
   std::vector<std::byte> codes;
 };
 
-/// What a frame's depths take at most, with the cells of depth_cells_of(), in captured rooms and
-/// cities.
+/// What the depths of an eye take at most in a frame, with the cells of depth_cells_of(), in
+/// captured rooms and cities.
 inline constexpr int depth_bits = 9'000;
 
-/// Cells for pictures of this size: about 64x36 of them, and about square.
-glm::ivec2 depth_cells_of(glm::ivec2 size_px);
+/// Cells for pictures of this size: about 64x36 of them, and about square. With several eyes side
+/// by side, each has so many.
+glm::ivec2 depth_cells_of(glm::ivec2 size_px, int eyes = 1);
 
 /// Packs a grid that has cells. Inverse depths are finite and not negative.
 PackedDepths pack(const DepthGrid& grid);

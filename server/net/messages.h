@@ -15,6 +15,7 @@
 #include <glm/vec3.hpp>
 
 #include "render_core/math/camera.h"
+#include "render_core/math/stereo.h"
 #include "render_core/scene/scene_about.h"
 #include "render_core/scene/splat_model.h"
 #include "server/base/clock.h"
@@ -45,7 +46,8 @@ struct Settings {
   int max_fps = 0;              // 0: the server's default
   int max_bitrate_kbps = 0;
   bool fixed_quality = false;
-  bool depths = false;  // frames bring a depth grid, where the core makes them
+  bool depths = false;             // frames bring a depth grid, where the core makes them
+  std::optional<Stereo> stereo{};  // pictures show two eyes, and sizes are those of both
 
   bool operator==(const Settings&) const = default;
 };

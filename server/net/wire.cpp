@@ -218,6 +218,15 @@ void fill(const PackedDepths& depths, v1::FrameHeader& header) {
   header.set_depth_codes(depths.codes.data(), depths.codes.size());
 }
 
+void fill(const Eye& eye, v1::Eye& out) {
+  out.set_right_of_pose(eye.offset.x);
+  out.set_below_pose(eye.offset.y);
+  out.set_left(eye.low.x);
+  out.set_right(eye.high.x);
+  out.set_up(eye.low.y);
+  out.set_down(eye.high.y);
+}
+
 v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   v1::FrameHeader header;
   header.set_frame_id(ticket.frame_id);
@@ -235,6 +244,10 @@ v1::FrameHeader frame_header(const FrameTicket& ticket, TimePoint now) {
   header.set_encode_us(elapsed_us(ticket.render->end, ticket.encode->end));
   header.set_send_wait_us(elapsed_us(ticket.encode->end, now));
   header.set_still(ticket.still);
+  if (ticket.stereo) {
+    fill(ticket.stereo->front(), *header.mutable_stereo()->mutable_left());
+    fill(ticket.stereo->back(), *header.mutable_stereo()->mutable_right());
+  }
   return header;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -118,6 +119,31 @@ glm::ivec2 checked_size(const std::string& name, std::uint32_t width, std::uint3
   return size_px;
 }
 
+Eye parse(const v1::Eye& message, const std::string& field) {
+  const auto named = [&](std::string_view part) { return fmt::format("{}.{}", field, part); };
+  const auto offset = [&](std::string_view part, float value) {
+    return checked(named(part), value, -max_coordinate, max_coordinate);
+  };
+  const auto tangent = [&](std::string_view part, float value, float low = -max_eye_tangent) {
+    return checked(named(part), value, low, max_eye_tangent);
+  };
+  Eye eye;
+  eye.offset = {offset("right_of_pose", message.right_of_pose()),
+                offset("below_pose", message.below_pose())};
+  eye.low = {tangent("left", message.left()), tangent("up", message.up())};
+  eye.high = {tangent("right", message.right(), eye.low.x + 2.0f * least_eye_span),
+              tangent("down", message.down(), eye.low.y + 2.0f * least_eye_span)};
+  return eye;
+}
+
+/// An eye has a whole number of columns.
+void check_halves(const Settings& settings) {
+  for (const auto& [field, width] :
+       {std::pair("settings.width_px", settings.size_px.x),
+        std::pair("settings.still_width_px", settings.still_size_px.x)})
+    if (width % 2 != 0) throw Invalid(fmt::format("{}: {} is odd, for two eyes", field, width));
+}
+
 Settings parse(const v1::Settings& message) {
   Settings settings;
   settings.size_px = checked_size("settings.", message.width_px(), message.height_px());
@@ -128,6 +154,11 @@ Settings parse(const v1::Settings& message) {
       checked_or_zero("settings.max_bitrate_kbps", message.max_bitrate_kbps(), 100, 200'000);
   settings.fixed_quality = message.fixed_quality();
   settings.depths = message.depths();
+  if (message.has_stereo()) {
+    settings.stereo = Stereo{parse(message.stereo().left(), "settings.stereo.left"),
+                             parse(message.stereo().right(), "settings.stereo.right")};
+    check_halves(settings);
+  }
   return settings;
 }
 

@@ -9,6 +9,7 @@
 #include <glm/vec2.hpp>
 
 #include "render_core/math/camera.h"
+#include "render_core/math/stereo.h"
 #include "server/base/clock.h"
 #include "server/encode/encoder.h"
 #include "server/encode/packed_depths.h"
@@ -28,7 +29,8 @@ struct FrameTicket {
   std::int64_t pose_client_time_us = 0;  // that sample's time on the client's clock
   Pose render_pose;
   float fov_y_rad = 0.0f;
-  float view_height = 0.0f;  // as in PoseSample
+  float view_height = 0.0f;        // as in PoseSample
+  std::optional<Stereo> stereo{};  // the picture shows two eyes
 
   Codec codec = Codec::h264;
   bool idr = false;

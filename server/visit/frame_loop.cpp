@@ -45,6 +45,13 @@ void FrameLoop::clip(const ClipBox& box, TimePoint now) {
   rest_.moved(now);
 }
 
+void FrameLoop::see_with(const std::optional<Stereo>& eyes, TimePoint now) {
+  if (eyes == eyes_) return;
+  eyes_ = eyes;
+  shown_.reset();
+  rest_.moved(now);
+}
+
 bool FrameLoop::pose_arrived(const PoseSample& sample, TimePoint now) {
   const auto before = track_.newest();
   // A picture drawn now is expected to be seen as long after its pose as recent pictures were.
@@ -123,6 +130,8 @@ void FrameLoop::start(FrameOrder& order, TimePoint now) {
   order.request.camera = make_view_camera(aim.world_from_camera, ticket.size_px, aim.fov_y_rad,
                                           aim.view_height, near_z_);
   order.request.camera.clip = clip_;
+  if (aim.view_height == 0.0f) order.request.stereo = eyes_;
+  ticket.stereo = order.request.stereo;
   order.request.background = background_;
   order.request.detail_px = ticket.still ? policy_.detail_px : detail_.detail_px();
   order.request.soon = track_.ahead(pages_ahead);

@@ -38,6 +38,8 @@ class FrameLoop {
   /// From the next picture on, until the scene changes.
   void clip(const ClipBox& box, TimePoint now);
   [[nodiscard]] const ClipBox& clip() const { return clip_; }
+  /// From the next picture on; nothing: one eye. An orthographic view has one eye.
+  void see_with(const std::optional<Stereo>& eyes, TimePoint now);
   /// The client's newest camera in this scene, if any.
   [[nodiscard]] const std::optional<PoseSample>& camera() const { return track_.newest(); }
   /// Continues from the pose of a resumed client, and from the tour that led it.
@@ -81,6 +83,7 @@ class FrameLoop {
   float near_z_ = 0.0f;
   glm::vec3 background_{0.0f};
   ClipBox clip_;
+  std::optional<Stereo> eyes_;
   CameraTrack track_;
   std::optional<TimePoint> pose_received_;
   FramePace pace_;

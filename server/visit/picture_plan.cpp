@@ -13,6 +13,9 @@ namespace {
 constexpr int least_still_preset = 2;
 static_assert(effort_presets[least_still_preset].name == "superfast");
 
+/// The size of a picture whose halves have even sides.
+glm::ivec2 with_even_halves(glm::ivec2 size_px) { return size_px - glm::ivec2(size_px.x % 4, 0); }
+
 }  // namespace
 
 FlowRequest request_within(const VisitPolicy& policy, const Settings& settings,
@@ -93,6 +96,10 @@ void PicturePlan::update() {
   moving_.aq_strength = policy_.x264_aq;
   apply(effort_, moving_);
   still_size_px_ = still_size_within(policy_, settings_, viewport_px_);
+  stereo_ = settings_.stereo;
+  if (!stereo_) return;
+  moving_.size_px = with_even_halves(moving_.size_px);
+  still_size_px_ = with_even_halves(still_size_px_);
 }
 
 }  // namespace catgs

@@ -48,6 +48,8 @@ class PicturePlan {
   }
   /// Whether frames bring a depth grid.
   [[nodiscard]] bool depths() const { return settings_.depths; }
+  /// The eyes that pictures of these sizes show; nothing: one.
+  [[nodiscard]] const std::optional<Stereo>& stereo() const { return stereo_; }
   [[nodiscard]] const EncoderEffort& effort() const { return effort_; }
   [[nodiscard]] double pixel_share() const { return pixel_share_; }
 
@@ -66,6 +68,7 @@ class PicturePlan {
   double pixel_share_ = 1.0;
   EncoderSettings moving_;
   glm::ivec2 still_size_px_{0};
+  std::optional<Stereo> stereo_;
   bool larger_stills_ = true;
 };
 

@@ -87,6 +87,7 @@ void Visit::on_live_message(const ClientMessage& message, TimePoint now) {
     frames_.follow(*path);
   } else if (const auto* settings = std::get_if<Settings>(&message)) {
     stream_.plan().request(*settings, now);
+    frames_.see_with(stream_.plan().stereo(), now);
   } else if (const auto* selected = std::get_if<SelectScene>(&message)) {
     if (within(selected_, policy_.select_gap, now))
       awaited_scene_ = selected->scene_id;
@@ -130,6 +131,7 @@ bool Visit::begin(const Hello& hello, Admission admission, TimePoint now) {
     markers_.watch({});
   }
   const bool goes_on = stream_.begin(std::move(admission), hello);
+  frames_.see_with(stream_.plan().stereo(), now);
   frames_.go_on_from(hello, now);
   if (!goes_on) stream_.open();
   return goes_on;
@@ -196,14 +198,17 @@ std::optional<FrameCandidate> Visit::next_frame() const {
 
 FrameOrder Visit::start_frame(TimePoint now) {
   assert(life_.on_show());
+  frames_.see_with(stream_.plan().stereo(), now);
   // Only time decides. If credit was missing, the first picture of a pose may already be the still.
   FrameOrder order = stream_.begin_frame(frames_.rests(now), now);
   frames_.start(order, now);
   // An orthographic picture is moved without them, and on a slow link the picture needs the bits.
   constexpr int least_share = 6;
-  const bool has_bits = 1000 * order.bitrate_kbps >= least_share * depth_bits * order.real_fps;
+  const int eyes = order.request.stereo ? 2 : 1;
+  const bool has_bits =
+      1000 * order.bitrate_kbps >= eyes * least_share * depth_bits * order.real_fps;
   if (stream_.plan().depths() && order.ticket.view_height == 0.0f && has_bits)
-    order.request.depth_cells = depth_cells_of(order.ticket.size_px);
+    order.request.depth_cells = depth_cells_of(order.ticket.size_px, eyes);
   return order;
 }
 
@@ -247,6 +252,7 @@ void Visit::on_tick(TimePoint now, int sessions, bool outdated) {
     return;
   }
   stream_.plan().on_tick(now);
+  frames_.see_with(stream_.plan().stereo(), now);
   if (const auto hidden = look(markers_, stream_, frames_, now)) say(*hidden, now);
   if (outdated) frames_.outdate();
   if (const auto idle = life_.idle_message(now)) {

@@ -60,6 +60,7 @@ void add_bench_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("bench", "Measures how fast, and how well, a camera path renders");
   add_render_options(*command, options->render);
+  add_stereo_options(*command, options->render);
   command->add_option("--warmup", options->warmup,
                       fmt::format("Frames rendered before measuring ({})", default_warmup));
   command

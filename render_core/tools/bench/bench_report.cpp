@@ -99,7 +99,9 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
   }
   json["fps"] = setup.fps;
   json["frames"] = {setup.first, setup.first + setup.poses.size()};
-  json["size_px"] = {setup.camera.size_px.x, setup.camera.size_px.y};
+  const glm::ivec2 size_px = setup.picture_px();
+  json["size_px"] = {size_px.x, size_px.y};
+  if (setup.eye_distance) json["eye_distance"] = *setup.eye_distance;
   json["focal_px"] = setup.camera.focal_px.x;
   json["near"] = setup.camera.near_z;
   const ViewSettings& settings = result.settings;
@@ -242,7 +244,7 @@ void print_report(const RenderSetup& setup, const BenchResult& result) {
   const ListLength lists = measurement.list_length();
   const bool groups = setup.made.renderer->has_windows(result.settings.pipeline);
   fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.gaussians(),
-             setup.cloud->sh_degree, setup.camera.size_px.x, setup.camera.size_px.y,
+             setup.cloud->sh_degree, setup.picture_px().x, setup.picture_px().y,
              pipeline_name(result.settings.pipeline));
   fmt::print("{} ({})\n", setup.made.renderer->description(), setup.made.reason);
   const std::string of_views = result.views > 1 ? fmt::format(" of {} views", result.views) : "";

@@ -113,7 +113,7 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
   if (is_folder && has_names && !problem.empty())
     fmt::print(stderr, "note: pictures have frame numbers, since {}\n", problem);
   auto sink = make_frame_sink({.path = options.out,
-                               .size_px = setup.camera.size_px,
+                               .size_px = setup.picture_px(),
                                .fps = setup.fps,
                                .first_frame = setup.first,
                                .names = names,
@@ -179,6 +179,7 @@ void add_frames_command(CLI::App& app) {
   auto options = std::make_shared<FramesOptions>();
   CLI::App* command = app.add_subcommand("frames", "Renders a camera path to pictures or a video");
   add_render_options(*command, options->render);
+  add_stereo_options(*command, options->render);
   command->add_option("--out", options->out,
                       "A folder of PNG files, or a .png, .y4m or .mp4 file. In a folder, pictures "
                       "have the names that the path's file gives them, else numbers");
@@ -200,9 +201,11 @@ void add_frames_command(CLI::App& app) {
                              panorama_size))
       ->excludes(alpha)
       ->excludes(depth)
+      ->excludes(command->get_option("--stereo"))
       ->excludes(command->get_option("--fov-deg"))
       ->excludes(command->get_option("--focal-px"))
       ->excludes(command->get_option("--orthographic"));
+  for (auto* layer : {alpha, depth}) layer->excludes(command->get_option("--stereo"));
   command->get_option("--fps")->description(
       "Frames per second (default: 30 for a script, else the rate of the trace, of which a video "
       "gets 30 at most). The trace is resampled, but forecasts use its recorded samples only, and "

@@ -100,6 +100,18 @@ TEST_F(CatgsRender, CompareExitsWithOneWhereTheRequirementFails) {
   EXPECT_EQ(json.at("ssim"), 1.0);
 }
 
+TEST_F(CatgsRender, BenchDrawsBothEyes) {
+  const Outcome outcome = run(fmt::format(
+      "bench {} --stereo --size 64x48 --script orbit --duration 0.1 --quality --json {}", scene(),
+      path("bench.json")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.out;
+  std::ifstream file(path("bench.json"));
+  const auto json = nlohmann::json::parse(file);
+  EXPECT_EQ(json.at("settings").at("size_px"), (nlohmann::json{128, 48}));
+  EXPECT_FLOAT_EQ(json.at("settings").at("eye_distance").get<float>(), 0.064f);
+  EXPECT_GE(json.at("quality").at("key").at("psnr_db").at("min").get<double>(), 60.0);
+}
+
 TEST_F(CatgsRender, BenchReportsEveryFrame) {
   const Outcome outcome =
       run(fmt::format("bench {} --size 64x48 --script orbit --duration 0.1 --quality --json {}",

@@ -61,6 +61,37 @@ TEST_F(PicturePlanTest, IsThatOfTheHelloUntilTheClientAsksForAnother) {
   EXPECT_EQ(plan.moving().fps, 30);
 }
 
+TEST_F(PicturePlanTest, HalvesOfTwoEyesHaveEvenSides) {
+  Settings settings = sized({2 * 333, 361}, {2 * 667, 700});
+  settings.stereo = Stereo{};
+  plan.request(settings, now);
+  EXPECT_EQ(plan.stereo(), settings.stereo);
+  EXPECT_EQ(plan.moving().size_px, glm::ivec2(664, 360));
+  EXPECT_EQ(plan.still_size_px(), glm::ivec2(1332, 700));
+  for (const double share : {0.9, 0.7, 0.5, 0.3, 0.2}) {
+    plan.use_pixel_share(share);
+    EXPECT_EQ(plan.moving().size_px.x % 4, 0) << share;
+  }
+  plan.use_pixel_share(1.0);
+  settings.stereo.reset();
+  plan.request(settings, now += 1s);
+  EXPECT_FALSE(plan.stereo());
+  EXPECT_EQ(plan.moving().size_px, glm::ivec2(666, 360));
+}
+
+TEST_F(PicturePlanTest, EyesComeWithTheirSizes) {
+  Settings settings = sized({640, 320});
+  plan.request(settings, now);
+  settings.size_px = {1280, 640};
+  settings.stereo = Stereo{};
+  plan.request(settings, now + 1ms);
+  EXPECT_FALSE(plan.stereo()) << "settings that alternate wait";
+  EXPECT_EQ(plan.moving().size_px, glm::ivec2(640, 320));
+  plan.on_tick(now + 1s);
+  EXPECT_TRUE(plan.stereo());
+  EXPECT_EQ(plan.moving().size_px, glm::ivec2(1280, 640));
+}
+
 // Each combination would be another encoder, and an IDR.
 TEST_F(PicturePlanTest, SettingsThatAlternateQuicklyAreFollowedFourTimesASecond) {
   int encoders = 0;

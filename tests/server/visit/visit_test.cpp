@@ -101,6 +101,51 @@ TEST_F(VisitTest, OrdersDepthsForClientsThatWantThem) {
   EXPECT_EQ(run_frame().request.depth_cells, glm::ivec2(0)) << "moved without depths";
 }
 
+TEST_F(VisitTest, OrdersBothEyesForHeadsets) {
+  greet();
+  pose(1, 0.0f);
+  const auto next_order = [&] {
+    EXPECT_TRUE(frame_is_due()) << "though the head rests";
+    const FrameOrder order = run_frame();
+    ack(order.ticket.frame_id);
+    EXPECT_EQ(order.ticket.stereo, order.request.stereo);
+    EXPECT_TRUE(check_request(order.request, PixelFormat::i420).ok());
+    return order;
+  };
+  EXPECT_FALSE(next_order().request.stereo);
+  Settings settings;
+  settings.size_px = {1280, 640};
+  settings.stereo = Stereo{};
+  settings.depths = true;
+  session.on_message(settings, now += 1s);
+  const FrameOrder order = next_order();
+  EXPECT_EQ(order.request.stereo, settings.stereo);
+  EXPECT_EQ(order.request.camera.size_px, settings.size_px);
+  EXPECT_EQ(order.request.depth_cells, depth_cells_of(settings.size_px, 2));
+  settings.stereo->front().offset.x = -0.1f;
+  session.on_message(settings, now += 1s);
+  EXPECT_EQ(next_order().request.stereo, settings.stereo) << "eyes have moved apart";
+  settings.stereo.reset();
+  session.on_message(settings, now += 1s);
+  EXPECT_FALSE(next_order().request.stereo);
+}
+
+TEST_F(VisitTest, OrthographicViewsHaveOneEye) {
+  Settings settings;
+  settings.size_px = {1280, 640};
+  settings.stereo = Stereo{};
+  greet(settings);
+  PoseSample parallel;
+  parallel.pose_id = 1;
+  parallel.fov_y_rad = 1.0f;
+  parallel.view_height = 4.0f;
+  session.on_message(parallel, now);
+  const FrameOrder order = run_frame();
+  EXPECT_FALSE(order.request.stereo);
+  EXPECT_FALSE(order.ticket.stereo);
+  EXPECT_TRUE(check_request(order.request, PixelFormat::i420).ok());
+}
+
 TEST_F(VisitTest, WarnsAnewAfterEverySignOfLifeAndThenReleases) {
   greet();
   const std::function<void()> signs_of_life[] = {

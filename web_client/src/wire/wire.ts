@@ -15,6 +15,7 @@ import {
 } from './generated/catgs_pb';
 
 export * from './generated/catgs_pb';
+export * from './generated/types_pb';
 
 export const subprotocol = 'catgs.v1';
 export const wire_version = 1;

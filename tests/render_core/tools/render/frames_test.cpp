@@ -397,6 +397,24 @@ TEST_F(Frames, OrthographicViewsAndSectionsEqualTheReference) {
   }
 }
 
+TEST_F(Frames, StereoPicturesShowBothEyes) {
+  draw("both.png", "--stereo --eye-distance 0.6");
+  const Image both = read_png(path("both.png"));
+  ASSERT_EQ(both.size_px, glm::ivec2(128, 48));
+  // The wall is 3 away and begins right of the head, so its edge lies 40 * 0.6 / 3 px apart.
+  const auto begin_in = [&](int left_px) {
+    int column = left_px;
+    while (column < left_px + 64 && both.row(24)[3 * column] < 0.4f) ++column;
+    return column - left_px;
+  };
+  EXPECT_NEAR(begin_in(0) - begin_in(64), 8, 1) << "further right for the left eye";
+  EXPECT_NEAR(begin_in(64), 33, 3);
+  for (const char* wrong : {"--eye-distance 0.6", "--stereo --panorama", "--stereo --alpha",
+                            "--stereo --depth", "--stereo --orthographic 4"})
+    EXPECT_NE(frames(fmt::format("--script still --out {} {}", path("no.png"), wrong)).exit_code, 0)
+        << wrong;
+}
+
 TEST_F(Frames, APanoramaShowsAllAround) {
   std::ofstream(path("wall.json")) << R"({"up": "-y"})";
   const auto panorama = [&](const std::string& size, const std::string& out) {
