@@ -94,6 +94,8 @@ class CudaRenderer final : public Renderer {
     return all;
   }
 
+  [[nodiscard]] bool has_windows(Pipeline pipeline) const override { return has_groups(pipeline); }
+
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     std::vector<int> candidates;
     for (const Device& device : devices_) candidates.push_back(device.index);

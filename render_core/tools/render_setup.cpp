@@ -249,6 +249,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;
   setup.made = setup.tree ? make_renderer(setup.tree, core) : make_renderer(setup.cloud, core);
+  refuse_windows_without(*setup.made.renderer, options.pipeline);
   return setup;
 }
 
