@@ -47,6 +47,8 @@ async function open(
 async function look(page: FirefoxPage, name: string): Promise<void> {
   await settle(page);
   await page.keep_screenshot(`firefox-${name}`);
+  // It has no WebXR.
+  expect(await page.evaluate(() => document.getElementById('button-headset')!.hidden)).toBe(true);
   expect(await barriers(page)).toEqual([]);
 }
 

@@ -59,7 +59,7 @@ LAYERS = {name: rank for rank, line in enumerate([
     "web_client/src/camera web_client/src/decode web_client/src/measure web_client/src/transport",
     "web_client/src/input web_client/src/present web_client/src/session web_client/src/stats web_client/src/tour web_client/src/walk",
     "web_client/src/worker web_client/src/captions web_client/src/portals web_client/src/film web_client/src/charts",
-    "web_client/src/page", "web_client/src/author", "web_client/src/ui", "web_client/src/media web_client/src/walkable_area",
+    "web_client/src/page", "web_client/src/author", "web_client/src/ui", "web_client/src/media web_client/src/walkable_area web_client/src/headset",
     "web_client/src",
 ]) for name in line.split()}
 LAYERED = re.compile(r"^render_core/|^server/|^web_client/src/(?!\w+/generated/)")
@@ -88,7 +88,7 @@ INCLUDE_RULES = [
 IMPORT_RULES = [
     IncludeRule(r"^web_client/src/(?!wire/)", r"^@bufbuild/protobuf|wire/generated/",
                 "src/wire alone speaks protobuf"),
-    IncludeRule(r"^web_client/src/(page|author|ui|media|walkable_area)/", r"^\.\./(transport/|worker/worker$|session/session$)",
+    IncludeRule(r"^web_client/src/(page|author|ui|media|walkable_area|headset)/", r"^\.\./(transport/|worker/worker$|session/session$)",
                 "the page speaks to the worker through worker/client"),
 ]
 

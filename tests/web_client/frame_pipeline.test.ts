@@ -41,7 +41,7 @@ let failures_seen: number[];
 let has_decoder: boolean;
 let goes_on: boolean; // decoders take another stream
 let make: (made: Decoder | undefined) => Promise<Decoder | undefined>;
-let draw: () => Promise<void>;
+let draw: () => Promise<number | undefined>;
 let fails_at: bigint | undefined; // the frame on which decoders fail at once
 let refresh: (() => void)[];
 let drawn: FakePicture[];
@@ -57,7 +57,7 @@ beforeEach(() => {
   time = new FakeTime();
   vi.spyOn(console, 'warn').mockImplementation(() => undefined);
   make = (made) => Promise.resolve(made);
-  draw = () => Promise.resolve();
+  draw = () => Promise.resolve(undefined);
   decoders = [];
   failures_seen = [];
   has_decoder = true;
@@ -159,6 +159,20 @@ describe('newest frame wins', () => {
     now_us = 70_000;
     await display();
     expect(acks).toMatchObject([{ poseAgeUs: 60_000 }]);
+  });
+
+  it('says when a visitor sees a picture that a headset shows later, if ever', async () => {
+    const made = await configure();
+    push(1n, { poseClientTimeUs: 10_000n });
+    decode(made, 1n);
+    draw = () => Promise.resolve(90_000);
+    now_us = 70_000;
+    await display();
+    push(2n);
+    decode(made, 2n);
+    draw = () => Promise.resolve(0); // never
+    await display();
+    expect(acks).toMatchObject([{ presentedUs: 90_000n, poseAgeUs: 80_000 }, { dropped: true }]);
   });
 
   it('drops what a hidden page will not draw', async () => {
@@ -376,7 +390,7 @@ describe('a step that does not end', () => {
     await seconds(3);
     expect(picture.closed).toBe(true);
     expect([failures_seen, dropped]).toEqual([[0, 1], [1n]]);
-    draw = () => Promise.resolve();
+    draw = () => Promise.resolve(undefined);
     push(2n, { idr: true });
     decode(decoder(), 2n);
     await display();

@@ -1,5 +1,6 @@
 // Makes the parts of the page and starts the worker. Parts listen to each other without passing through here.
 import { make_editor } from './author_editor';
+import { offer_headset } from './headset/offer';
 import { TourMedia } from './media/tour_media';
 import { make_page_parts } from './page/parts';
 import type { AccessToken } from './session/token';
@@ -51,6 +52,7 @@ export function mount_viewer(
   const screen = new AwakeScreen();
   tours.shown.listen(({ playing }) => screen.watch('tour', playing));
   shared_tour.takes_part.listen((takes_part) => screen.watch('leader', takes_part));
+  offer_headset({ ...parts, tours, measures, walkable_area });
   window.catgs = make_automation(worker, navigation, clock);
   return mount_session(parts, card, stream_size, scene_id);
 }

@@ -51,6 +51,9 @@ export interface WatchedPage {
   readonly errors: string[];
 }
 
+/** A function that sees nothing but the page, or the text of a script. */
+type Script = string | (() => void);
+
 /** A page in a context of its own. After a test it is emptied, and a later test of the same kind gets it. */
 interface Tab {
   readonly page: Page;
@@ -98,7 +101,7 @@ export async function give_back_pages(are_reusable: boolean): Promise<void> {
   for (const tab of used.splice(0)) await give_back(tab, are_reusable);
 }
 
-async function take_tab(options: BrowserContextOptions, prepare?: () => void): Promise<Tab> {
+async function take_tab(options: BrowserContextOptions, prepare?: Script): Promise<Tab> {
   const kind = kind_of(options);
   const at = prepare ? -1 : free.findIndex((tab) => tab.kind === kind);
   const [tab] = at < 0 ? [await make_tab(options, kind, prepare)] : free.splice(at, 1);
@@ -113,7 +116,7 @@ async function take_tab(options: BrowserContextOptions, prepare?: () => void): P
 async function make_tab(
   options: BrowserContextOptions,
   kind: string,
-  prepare?: () => void,
+  prepare?: Script,
 ): Promise<Tab> {
   browser ??= launch_browser();
   const context = await (await browser).newContext(options);
@@ -139,7 +142,7 @@ export async function in_page<T>(work: (page: Page) => Promise<T>): Promise<T> {
  */
 export async function new_page(
   options: BrowserContextOptions = default_options,
-  prepare?: () => void,
+  prepare?: Script,
 ): Promise<WatchedPage> {
   const tab = await take_tab(options, prepare);
   used.push(tab);
@@ -153,8 +156,12 @@ export async function new_page(
 }
 
 /** A page that shows its first picture. */
-export async function open(url: string, options?: BrowserContextOptions): Promise<WatchedPage> {
-  const watched = await new_page(options);
+export async function open(
+  url: string,
+  options?: BrowserContextOptions,
+  prepare?: Script,
+): Promise<WatchedPage> {
+  const watched = await new_page(options, prepare);
   await watched.page.goto(url);
   await settle(watched.page);
   return watched;

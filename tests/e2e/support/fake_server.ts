@@ -145,6 +145,8 @@ interface SceneWords {
   readonly upIsDoubtful?: boolean;
   readonly title?: string;
   readonly credits?: string;
+  readonly scale?: number;
+  readonly startPose?: object;
 }
 
 /** A welcome to a small scene whose pictures are JPEGs of 640x360. */

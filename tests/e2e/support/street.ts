@@ -3,6 +3,7 @@ import { deflateRawSync } from 'node:zlib';
 import { add, rotate, scale, type Vec3 } from '#client/base/vector';
 import type { Eye } from '#client/camera/eye';
 import type { DepthFields } from '#client/present/depth_mesh';
+import { frustum_of_eye, type FrustumView } from '#client/present/frustum';
 import type { Picture } from './pictures';
 
 interface Box {
@@ -50,37 +51,59 @@ function grey(point: Vec3): number {
 }
 
 /** View depth and grey along a ray of the view; x and y are -1…1 across it. Infinite: sky. */
-function seen(eye: Eye, aspect: number, x: number, y: number): { depth: number; grey: number } {
-  const half = Math.tan(eye.fov_y_rad / 2);
-  const ray = rotate(eye.orientation, [x * half * aspect, y * half, 1]);
-  const depth = Math.min(...boxes.map((box) => distance_to(box, eye.position, ray)));
-  return { depth, grey: depth < Infinity ? grey(add(eye.position, scale(ray, depth))) : 230 };
+function seen(view: FrustumView, x: number, y: number): { depth: number; grey: number } {
+  const { left, right, up, down } = view.frustum;
+  const across = left + ((right - left) * (x + 1)) / 2;
+  const ray = rotate(view.orientation, [across, up + ((down - up) * (y + 1)) / 2, 1]);
+  const depth = Math.min(...boxes.map((box) => distance_to(box, view.position, ray)));
+  return { depth, grey: depth < Infinity ? grey(add(view.position, scale(ray, depth))) : 230 };
 }
 
-export function street_picture(eye: Eye, width: number, height: number): Picture {
+const centred = (eye: Eye, aspect: number): FrustumView => ({
+  ...eye,
+  frustum: frustum_of_eye(eye, aspect),
+});
+
+export const street_picture = (eye: Eye, width: number, height: number): Picture =>
+  street_view([centred(eye, width / height)], width, height);
+
+/** Views of the same size, side by side in a picture. */
+export function street_view(views: readonly FrustumView[], width: number, height: number): Picture {
   const rgba = new Uint8ClampedArray(4 * width * height);
   for (let i = 0; i < width * height; ++i) {
     const [column, row] = [i % width, Math.floor(i / width)];
-    const x = (2 * column + 1) / width - 1;
-    const value = seen(eye, width / height, x, (2 * row + 1) / height - 1).grey;
+    const [view, x] = place_in(views, (column + 0.5) / width);
+    const value = seen(view, x, (2 * row + 1) / height - 1).grey;
     rgba.set([value, value, value, 255], 4 * i);
   }
   return { width, height, rgba };
 }
 
-/** The depth grid of that picture, as a frame carries it. A cell has the depth of its middle. */
-export function street_depths(
+/** The view at this share of the width of a picture, and where in it, -1…1. */
+function place_in(
+  views: readonly FrustumView[],
+  share: number,
+): readonly [view: FrustumView, x: number] {
+  const at = share * views.length;
+  return [views[Math.floor(at)]!, 2 * (at - Math.floor(at)) - 1];
+}
+
+export const street_depths = (
   eye: Eye,
   aspect: number,
   columns: number,
   rows: number,
+): DepthFields => street_view_depths([centred(eye, aspect)], columns, rows);
+
+/** The depth grid of such a picture, as a frame carries it. A cell has the depth of its middle. */
+export function street_view_depths(
+  views: readonly FrustumView[],
+  columns: number,
+  rows: number,
 ): DepthFields {
   const inverse = Array.from({ length: columns * rows }, (_, i) => {
-    const [x, y] = [
-      (2 * (i % columns) + 1) / columns - 1,
-      (2 * Math.floor(i / columns) + 1) / rows - 1,
-    ];
-    return 1 / seen(eye, aspect, x, y).depth;
+    const [view, x] = place_in(views, ((i % columns) + 0.5) / columns);
+    return 1 / seen(view, x, (2 * Math.floor(i / columns) + 1) / rows - 1).depth;
   });
   const depthScale = Math.max(...inverse) / 255 ** 2;
   const codes = inverse.map((value) => Math.round(Math.sqrt(value / depthScale)));

@@ -58,13 +58,13 @@ export class CameraLoop {
     requestAnimationFrame(() => this.tick());
   }
 
-  /** Sends a sample of the camera at once. Returns its id. */
-  sample(): number {
+  /** Sends a sample of the camera at once. `time_us`: when the camera is there. Returns its id. */
+  sample(time_us = this.clock_.now_us()): number {
     this.changed_ = false;
     this.pose_id_ += 1;
     this.newest_ = {
       pose_id: this.pose_id_,
-      time_us: this.clock_.now_us(),
+      time_us,
       eye: this.camera_.eye,
       distance: this.camera_.sight_distance,
     };

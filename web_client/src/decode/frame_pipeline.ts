@@ -19,8 +19,11 @@ export interface PipelineEnvironment {
   ) => Promise<Decoder | undefined>;
   /** Calls back before the next refresh of the display. */
   on_refresh: (draw: () => void) => void;
-  /** One at a time; the picture is free when the promise resolves. */
-  draw: (picture: Picture, header: FrameHeader) => Promise<void>;
+  /**
+   * One at a time; the picture is free when the promise resolves: with the time at which the visitor sees it, where
+   * that is not then; with 0 where nobody does.
+   */
+  draw: (picture: Picture, header: FrameHeader) => Promise<number | undefined>;
 }
 
 export interface PipelineListener {
@@ -222,8 +225,9 @@ export class FramePipeline {
     const { frame, picture } = newest;
     const streams_ended = this.streams_ended_;
     let error: unknown;
+    let seen_us: number | undefined;
     try {
-      await in_time(this.env_.timers, this.env_.draw(picture, frame.header));
+      seen_us = await in_time(this.env_.timers, this.env_.draw(picture, frame.header));
     } catch (thrown) {
       error = thrown ?? new Error('the picture cannot be drawn');
     } finally {
@@ -236,7 +240,8 @@ export class FramePipeline {
       this.failed(error); // another way to decode may give pictures that can be drawn
       return;
     }
-    const presented_us = this.env_.now_us();
+    if (seen_us === 0) return this.drop(frame);
+    const presented_us = seen_us ?? this.env_.now_us();
     this.ack(frame, presented_us);
     this.listener_.presented(frame, presented_us);
   }

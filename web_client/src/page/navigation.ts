@@ -50,6 +50,8 @@ export class Navigation {
   own_up: Vec3 = [0, -1, 0];
   /** Another visitor's camera leads this one, or has led it here: no tour starts by itself. */
   led = false;
+  /** Flights end at once. */
+  jumps = false;
   private readonly chosen_ups_ = new Map<string, Vec3>();
   private readonly inertia_ = new Inertia();
   private readonly picks_: Picks;
@@ -107,7 +109,7 @@ export class Navigation {
 
   fly(way: Flight, ended: (arrived: boolean) => void): void {
     this.led_away.emit();
-    this.camera.fly(way, ended);
+    this.camera.fly(this.jumps ? { duration_s: 0, at: () => way.at(way.duration_s) } : way, ended);
     this.loop.wake();
   }
 

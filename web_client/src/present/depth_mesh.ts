@@ -4,7 +4,7 @@ import { inflateSync } from 'fflate';
 import type { Eye } from '../camera/eye';
 import type { FrameHeader } from '../wire/wire';
 import type { Depths, Surface } from './presenter';
-import { warp_matrix } from './warp';
+import { warp_matrix, type Matrix3 } from './warp';
 
 const most_cells = 128; // a side
 const mesh_reach = 4; // how far beyond the picture's middle the mesh reaches
@@ -65,17 +65,28 @@ export function unpack_depths({
  * outermost cells, by rows. A point is its place in the view, homogeneous, with its view depth times
  * its inverse depth as third; its inverse depth; and its place in the picture.
  */
-export function mesh_points(
-  { columns, rows, inverse_depths }: Depths,
+export const mesh_points = (
+  depths: Depths,
   picture: Eye,
   view: Eye,
   aspect: number,
   view_aspect: number,
+): Float32Array =>
+  placed_mesh(depths, (distance) => warp_matrix(view, picture, view_aspect, distance, aspect));
+
+/**
+ * The same for any pair of picture and view. `view_from_picture`: the homography of the plane at this distance
+ * ahead of the picture. `reach`: where the frame of points is; the picture ends at 1.
+ */
+export function placed_mesh(
+  { columns, rows, inverse_depths }: Depths,
+  view_from_picture: (distance: number) => Matrix3,
+  reach = mesh_reach,
 ): Float32Array {
-  const far = warp_matrix(view, picture, view_aspect, Infinity, aspect);
-  const near = warp_matrix(view, picture, view_aspect, 1, aspect);
+  const far = view_from_picture(Infinity);
+  const near = view_from_picture(1);
   const place = (cell: number, cells: number): number =>
-    cell < 0 ? -mesh_reach : cell < cells ? (2 * cell + 1) / cells - 1 : mesh_reach;
+    cell < 0 ? -reach : cell < cells ? (2 * cell + 1) / cells - 1 : reach;
   const inside = (cell: number, cells: number): number => Math.max(0, Math.min(cell, cells - 1));
   const points = new Float32Array((columns + 2) * (rows + 2) * point_size);
   let at = 0;
@@ -122,18 +133,37 @@ void main() {
 const fragment_source = `#version 300 es
 precision mediump float;
 uniform sampler2D picture;
+uniform highp vec4 part;
+uniform highp vec2 most;
 in highp vec2 point;
 out vec4 colour;
 void main() {
-  colour = vec4(texture(picture, 0.5 + 0.5 * point).rgb, 1.0);
+  colour = vec4(texture(picture, part.zw + part.xy * clamp(point, -most, most)).rgb, 1.0);
 }`;
 
 const near_share = 0.01; // surfaces this much nearer than the nearest one still show
 
+/** The part of a texture that is the picture. */
+export interface TexturePart {
+  /** Half of its size, and its middle, as shares of the texture. */
+  readonly half: readonly [x: number, y: number];
+  readonly middle: readonly [x: number, y: number];
+  /** The outermost points that may be read; the picture ends at 1. */
+  readonly most: readonly [x: number, y: number];
+}
+
+const all_of_it: TexturePart = {
+  half: [0.5, 0.5],
+  middle: [0.5, 0.5],
+  most: [mesh_reach, mesh_reach], // the texture repeats its border
+};
+
 /** Draws meshes with one context. The texture that is bound there is the picture. */
-class MeshProgram {
+export class MeshProgram {
   private readonly program_;
   private readonly nearness_;
+  private readonly part_;
+  private readonly most_;
   private readonly array_;
   private readonly points_;
   private readonly triangles_;
@@ -158,6 +188,8 @@ class MeshProgram {
       throw new Error(`mesh shader: ${gl.getProgramInfoLog(this.program_) ?? ''}`);
     }
     this.nearness_ = gl.getUniformLocation(this.program_, 'nearness');
+    this.part_ = gl.getUniformLocation(this.program_, 'part');
+    this.most_ = gl.getUniformLocation(this.program_, 'most');
     this.array_ = gl.createVertexArray();
     this.points_ = gl.createBuffer();
     this.triangles_ = gl.createBuffer();
@@ -177,9 +209,16 @@ class MeshProgram {
     return this.gl_.isProgram(this.program_);
   }
 
-  draw({ columns, rows, nearest }: Depths, points: Float32Array): void {
+  /** The depth buffer is clear. */
+  draw(
+    { columns, rows, nearest }: Pick<Depths, 'columns' | 'rows' | 'nearest'>,
+    points: Float32Array,
+    { half, middle, most }: TexturePart = all_of_it,
+  ): void {
     const gl = this.gl_;
     gl.useProgram(this.program_);
+    gl.uniform4f(this.part_, ...half, ...middle);
+    gl.uniform2f(this.most_, ...most);
     gl.bindVertexArray(this.array_);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.points_);
     gl.bufferData(gl.ARRAY_BUFFER, points, gl.STREAM_DRAW);
@@ -193,7 +232,6 @@ class MeshProgram {
     gl.uniform1f(this.nearness_, nearest > 0 ? (2 * near_share) / nearest : 0);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
-    gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
     gl.drawElements(gl.TRIANGLES, this.count_, gl.UNSIGNED_SHORT, 0);
     gl.disable(gl.DEPTH_TEST);
     gl.bindVertexArray(null);
@@ -215,6 +253,7 @@ export function depth_surface(
     draw: (gl) => {
       let program = programs.get(gl);
       if (!program?.lives) programs.set(gl, (program = new MeshProgram(gl)));
+      gl.clear(gl.DEPTH_BUFFER_BIT | gl.COLOR_BUFFER_BIT);
       program.draw(depths, points);
     },
   };

@@ -37,6 +37,8 @@ export interface StatsSnapshot extends Motion {
   /** Of the last picture; undefined where the scene is in the server's memory as a whole. */
   readonly pages: PagesDrawn | undefined;
   readonly gpu: GpuUse | undefined; // of the last second in which one drew
+  readonly eyes: number; // that the last picture is for; 2: a headset's
+  readonly headset_hz: number | undefined; // refreshes of the headset that the visitor wears
 }
 
 /** What the server's GPU does for this picture. */
@@ -78,6 +80,9 @@ export class Metrics {
   private packets_dropped_ = 0;
   private pages_: PagesDrawn | undefined;
   private gpu_: GpuUse | undefined;
+  private eyes_ = 1;
+  /** Undefined: the visitor wears no headset. */
+  headset_hz: number | undefined;
 
   configured(config: StreamConfig): void {
     this.pose_age_.set_rate(config.fps);
@@ -95,6 +100,7 @@ export class Metrics {
     const { header } = frame;
     this.frames_shown_ += 1;
     this.size_px_ = [header.widthPx, header.heightPx];
+    this.eyes_ = header.stereo ? 2 : 1;
     this.shown_.push(now_us, 1);
     const pose_time_us = Number(header.poseClientTimeUs);
     // One picture of each pose counts. Pictures before the first pose do not.
@@ -155,6 +161,8 @@ export class Metrics {
       packets_dropped: this.packets_dropped_,
       pages: this.pages_,
       gpu: this.gpu_,
+      eyes: this.eyes_,
+      headset_hz: this.headset_hz,
       last_motion: this.motion((window) => window.newest()),
     };
   }

@@ -137,5 +137,5 @@ export function embed_code(address: string): string {
   const url = new URL(address);
   url.searchParams.set('ui', '0');
   const source = url.href.replaceAll('&', '&amp;').replaceAll('"', '&quot;');
-  return `<iframe src="${source}" style="width:100%;aspect-ratio:16/9;border:0" allow="fullscreen; gamepad; screen-wake-lock" title="${text.share.frame_title}"></iframe>`;
+  return `<iframe src="${source}" style="width:100%;aspect-ratio:16/9;border:0" allow="fullscreen; gamepad; screen-wake-lock; xr-spatial-tracking" title="${text.share.frame_title}"></iframe>`;
 }

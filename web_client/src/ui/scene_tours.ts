@@ -51,7 +51,9 @@ export class SceneTours {
           this.tell({ tour_index: tour, stop_index: stop, arrived: true });
         },
         when_heard: (then) => media_.when_heard(then),
-        reduced_motion,
+        get reduced_motion() {
+          return reduced_motion || navigation.jumps;
+        },
       },
       (state) => this.show(state),
     );

@@ -108,6 +108,11 @@ export const stats_rows: readonly Row[] = [
     text: (stats) => (stats.gpu === undefined ? nothing : gpu(stats.gpu)),
   },
   {
+    label: words.headset,
+    title: words.headset_title,
+    text: ({ headset_hz }) => (headset_hz ? measured([headset_hz], 1, units.fps) : nothing),
+  },
+  {
     label: words.drops,
     title: words.drops_title,
     text: once_shown((s) =>

@@ -11,7 +11,7 @@ const wall_cells = 40; // of height: a wall is taken to reach over a visitor's h
 const furniture_cells = 8;
 
 /** What a ray meets between two heights of a column: its ground, or something in the way. */
-function met_in(
+export function met_in(
   map: WalkMap,
   column: number,
   row: number,

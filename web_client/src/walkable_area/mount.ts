@@ -99,6 +99,16 @@ export class WalkableArea {
     });
   }
 
+  /** Undefined: it is not known, or there is none. */
+  get map(): WalkMap | undefined {
+    return this.map_;
+  }
+
+  /** Somebody is about to need the map. */
+  want_map(): void {
+    void this.loader_.want();
+  }
+
   /** Where the eyes of other visitors are, for the plan. */
   show_participants(positions: readonly Vec3[]): void {
     this.participants_ = positions;

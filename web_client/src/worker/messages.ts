@@ -14,6 +14,7 @@ import type { Quality, View } from '../session/quality';
 import type { SessionState } from '../session/state';
 import type { StatsReport } from '../stats/metrics';
 import type { FrameHeader, Hello_Device, Lead, StreamConfig, Welcome } from '../wire/wire';
+import type { HeadsetPicture, HeadsetStream } from './headset';
 
 /** A stop of a tour, or no more than the tour, or nothing. */
 export interface ShownStop {
@@ -51,6 +52,10 @@ export type ToWorker =
   | { kind: 'camera'; sample: CameraSample }
   | { kind: 'view'; view: View; quality: Quality }
   | { kind: 'warp'; mode: WarpMode }
+  /** Pictures go to the page from now on; undefined: to the canvas again. */
+  | { kind: 'headset'; stream: HeadsetStream | undefined }
+  /** The page has drawn the picture that it got. `rate_hz`: of the headset, measured. */
+  | { kind: 'shown'; seen_us: number; rate_hz: number }
   | { kind: 'path'; samples: readonly PathSample[] }
   | { kind: 'reached'; tour: number; stop: number }
   | { kind: 'pick'; id: number; ray: Ray }
@@ -93,6 +98,8 @@ export type FromWorker =
       warps: boolean;
       overscan: Sides;
     }
+  /** To a headset; 'shown' answers it. */
+  | HeadsetPicture
   /** Decoding works on this rung here. */
   | { kind: 'rung'; rung: DecoderRung }
   /** Answers a pick. `hit`: undefined where nothing is there. */

@@ -2,11 +2,10 @@
 import { browser_timers, clock_from } from '../base/clock';
 import { refreshes } from '../base/patience';
 import { widened, type CameraSample, type Eye } from '../camera/eye';
-import type { PathSample } from '../camera/flight';
 import { FramePipeline } from '../decode/frame_pipeline';
 import { failures_per_rung, type DecoderRung } from '../decode/ladder';
 import { available_codecs, make_decoder, type MadeDecoder } from '../decode/make_decoder';
-import type { DecoderEvents } from '../decode/picture';
+import type { DecoderEvents, Picture } from '../decode/picture';
 import { Display } from '../present/display';
 import { make_presenter } from '../present/make_presenter';
 import {
@@ -16,7 +15,6 @@ import {
   SceneCoordinates,
   show_message,
 } from '../session/camera_messages';
-import type { Quality, View } from '../session/quality';
 import { Session } from '../session/session';
 import type { SessionState } from '../session/state';
 import { Metrics } from '../stats/metrics';
@@ -29,7 +27,9 @@ import {
   type StreamConfig,
 } from '../wire/wire';
 import { frame_sizes } from './frame_sizes';
+import type { HeadsetOutput, HeadsetStream } from './headset';
 import type { FromWorker, ToWorker } from './messages';
+import { snapshot_of } from './snapshot';
 
 type Start = Extract<ToWorker, { kind: 'start' }>;
 
@@ -73,14 +73,15 @@ class Client {
   private readonly session_: Session;
   private readonly metrics_ = new Metrics();
   private shown_: FrameHeader | undefined;
-  private view_: View;
-  private quality_: Quality;
+  private view_: Start['view'];
+  private quality_: Start['quality'];
   private camera_: CameraSample | undefined;
   private phase_: SessionState['phase'] = 'connecting';
   private host_ = ''; // the name of who presents
   private coordinates_ = new SceneCoordinates();
   private first_rung_: DecoderRung = 'prefer-hardware'; // where the present stream began
   private rung_: DecoderRung; // where the next stream begins on the ladder
+  private headset_: HeadsetOutput | undefined; // that the visitor wears
 
   constructor(start: Start) {
     this.clock_ = clock_from(start.page_origin_ms);
@@ -112,6 +113,18 @@ class Client {
     );
   }
 
+  /** Undefined: the visitor has taken the headset off. */
+  private wear(stream: HeadsetStream | undefined): void {
+    import('./headset').then(
+      ({ output_for }) => {
+        this.headset_ = output_for(stream, this.headset_, say);
+        if (!stream) this.metrics_.headset_hz = undefined;
+        this.send_sizes();
+      },
+      (error: unknown) => say({ kind: 'error', message: String(error) }),
+    );
+  }
+
   handle(message: Exclude<ToWorker, Start>): void {
     switch (message.kind) {
       case 'camera':
@@ -126,14 +139,21 @@ class Client {
       case 'warp':
         this.display_.mode = message.mode;
         break;
+      case 'headset':
+        this.wear(message.stream);
+        break;
+      case 'shown':
+        this.headset_?.shown(message.seen_us);
+        this.metrics_.headset_hz = this.headset_ && message.rate_hz;
+        break;
       case 'path':
-        this.send_path(message.samples);
+        this.send_path(message);
         break;
       case 'reached':
-        this.session_.send({ case: 'reached', value: { tour: message.tour, stop: message.stop } });
-        break;
       case 'pick':
-        this.pick(message);
+      case 'ping':
+      case 'prepare':
+        this.send(message);
         break;
       case 'markers':
       case 'show':
@@ -144,15 +164,9 @@ class Client {
       case 'select':
         this.session_.select_scene(message.scene_id);
         break;
-      case 'prepare':
-        this.session_.send({ case: 'prepare', value: { sceneId: message.scene_id } });
-        break;
       case 'hidden':
         this.session_.set_paused(message.hidden);
         this.pipeline_.hidden = message.hidden;
-        break;
-      case 'retry':
-        this.session_.retry();
         break;
       case 'token':
         this.session_.greet_anew({ token: message.token });
@@ -164,15 +178,13 @@ class Client {
       case 'present':
         this.present(message);
         break;
-      case 'ping':
-        this.ping(message);
-        break;
       case 'leave':
       case 'stop':
         this.session_.stop();
         break;
+      case 'retry':
       case 'come_back':
-        if (this.phase_ !== 'failed') this.session_.retry();
+        if (message.kind === 'retry' || this.phase_ !== 'failed') this.session_.retry();
         break;
       case 'get_stats':
         this.post_stats(message.request);
@@ -207,12 +219,8 @@ class Client {
     say({ kind: 'stats', request, stats: this.metrics_.snapshot(this.clock_.now_us()) });
   }
 
-  private present({
-    on,
-    name,
-    pings,
-    tells_positions,
-  }: Extract<ToWorker, { kind: 'present' }>): void {
+  private present(message: Extract<ToWorker, { kind: 'present' }>): void {
+    const { on, name, pings, tells_positions } = message;
     // The host's pictures and field of view are also those of participants, who see no warped view.
     this.display_.may_overscan = !on;
     this.session_.keep({
@@ -221,7 +229,7 @@ class Client {
     });
   }
 
-  private send_path(samples: readonly PathSample[]): void {
+  private send_path({ samples }: Extract<ToWorker, { kind: 'path' }>): void {
     this.session_.send_path(
       samples.map(({ time_us, eye }) =>
         pose_message(0, time_us, this.widened(this.coordinates_.to_scene(eye))),
@@ -229,12 +237,20 @@ class Client {
     );
   }
 
-  private ping({ point }: Extract<ToWorker, { kind: 'ping' }>): void {
-    this.session_.send({ case: 'ping', value: { place: this.coordinates_.point_message(point) } });
-  }
-
-  private pick({ id, ray }: Extract<ToWorker, { kind: 'pick' }>): void {
-    this.session_.send({ case: 'pick', value: { id, ...this.coordinates_.ray_message(ray) } });
+  private send(
+    message: Extract<ToWorker, { kind: 'reached' | 'pick' | 'ping' | 'prepare' }>,
+  ): void {
+    const { session_: session, coordinates_: coordinates } = this;
+    if (message.kind === 'reached')
+      session.send({ case: 'reached', value: { tour: message.tour, stop: message.stop } });
+    else if (message.kind === 'pick')
+      session.send({
+        case: 'pick',
+        value: { id: message.id, ...coordinates.ray_message(message.ray) },
+      });
+    else if (message.kind === 'ping')
+      session.send({ case: 'ping', value: { place: coordinates.point_message(message.point) } });
+    else session.send({ case: 'prepare', value: { sceneId: message.scene_id } });
   }
 
   private make_pipeline(): FramePipeline {
@@ -244,8 +260,8 @@ class Client {
         now_us,
         timers: browser_timers,
         make_decoder: (config, failures, events) => this.make_decoder(config, failures, events),
-        on_refresh,
-        draw: (picture, header) => this.display_.draw(picture, eye_of_frame(header), header),
+        on_refresh: (draw) => (this.headset_ ? draw() : on_refresh(draw)),
+        draw: (picture, header) => this.draw(picture, header),
       },
       {
         ack: (ack) => this.session_.send({ case: 'ack', value: ack }),
@@ -265,6 +281,19 @@ class Client {
         undecodable: (message) => this.fall_back(message),
       },
     );
+  }
+
+  private async draw(picture: Picture, header: FrameHeader): Promise<number | undefined> {
+    const eye = eye_of_frame(header);
+    if (this.headset_) return this.headset_.draw(picture, header, this.coordinates_.to_file(eye));
+    if (!header.stereo) await this.display_.draw(picture, eye, header);
+    else
+      await (
+        await import('./headset')
+      ).draw_left_half(picture, header, (left, its_header) =>
+        this.display_.draw(left, eye_of_frame(its_header), its_header),
+      );
+    return undefined;
   }
 
   private make_session(start: Start): Session {
@@ -343,7 +372,7 @@ class Client {
     this.camera_ = sample;
     if (!sample.at_rest) {
       this.metrics_.pose_sent(BigInt(sample.pose_id), sample.time_us);
-      this.display_.camera = sample;
+      if (!this.headset_) this.display_.camera = sample;
     }
     this.send_camera();
   }
@@ -363,13 +392,17 @@ class Client {
   }
 
   private frame_sizes(): SettingsInit {
+    if (this.headset_) return this.headset_.stream.settings;
     const { overscan, wants_depths } = this.display_;
     const sizes = frame_sizes(this.view_, this.quality_, overscan, this.presenter_.most_px);
     return { ...sizes, depths: wants_depths };
   }
 
   private widened(eye: Eye): Eye {
-    return widened(eye, this.display_.overscan.y);
+    const { headset_: headset } = this;
+    if (!headset) return widened(eye, this.display_.overscan.y);
+    // A server that draws both eyes needs no other, and hands on this one to followers.
+    return this.shown_?.stereo ? eye : { ...eye, fov_y_rad: headset.stream.fov_y_rad };
   }
 
   private tell_presenter(): void {
@@ -410,18 +443,8 @@ class Client {
   }
 
   private post_snapshot(request: number): void {
-    let picture;
-    try {
-      picture = this.shown_ && this.display_.read();
-    } catch (error) {
-      console.warn('the picture cannot be read', error);
-    }
-    const snapshot = this.shown_ &&
-      picture && {
-        header: this.coordinates_.header_in_file(this.shown_),
-        ...picture,
-        view: this.coordinates_.to_file(picture.view),
-      };
-    say({ kind: 'snapshot', request, snapshot }, picture && [picture.rgba.buffer]);
+    const shown = this.headset_ ? undefined : this.shown_; // the canvas shows another
+    const snapshot = shown && snapshot_of(this.display_, shown, this.coordinates_);
+    say({ kind: 'snapshot', request, snapshot }, snapshot && [snapshot.rgba.buffer]);
   }
 }
