@@ -38,8 +38,8 @@ void grow(std::vector<T>& buffer, std::size_t size) {
 
 CpuView::CpuView(std::shared_ptr<const CpuScene> scene, const ViewSettings& settings)
     : scene_(std::move(scene)), settings_(settings), driver_(settings) {
-  if (keeps_colours(settings.pipeline) && settings.colour_cache)
-    colours_.emplace(scene_->store().clusters().size());
+  settings_.colour_cache = settings.colour_cache && keeps_colours(settings.pipeline);
+  if (settings_.colour_cache) both_eyes_.front().colours.emplace(scene_->store().clusters().size());
   if (scene_->tree) paged_.emplace(*scene_->tree, settings);
 }
 
@@ -64,10 +64,15 @@ void CpuView::begin_eyes(const FrameRequest& request) {
     eye.camera = cameras[i];
     eye.picture = image_.part(static_cast<int>(i) * size_px.x, size_px);
     eye.depths.begin(size_px, cells);
+    if (settings_.colour_cache && !eye.colours)
+      eye.colours.emplace(scene_->store().clusters().size());
     if (settings_.pipeline == Pipeline::catgs)
       eye.occlusion.begin(eye.camera, mean_inverse_depth_, scene_->kernels, *scene_->pool);
   }
-  for (EyeBuffers& closed : std::span(both_eyes_).subspan(eyes_.size())) closed.occlusion.forget();
+  for (EyeBuffers& unused : std::span(both_eyes_).subspan(eyes_.size())) {
+    unused.occlusion.forget();
+    unused.colours.reset();
+  }
 }
 
 FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
@@ -76,7 +81,7 @@ FrameView CpuView::draw(const FrameRequest& request, const FramePlan& plan) {
   begin_eyes(request);
   clock.end(Stage::project);
   if (settings_.pipeline == Pipeline::vanilla) {
-    draw_boxes(request, stats);
+    draw_boxes(stats);
   } else if (plan.kind == FrameKind::key) {
     draw_lists(request, plan, stats);
   } else {
@@ -119,11 +124,11 @@ void CpuView::summarise(FrameStats& stats) const {
   stats.overflowed_entries = lists_.overflowed_entries();
 }
 
-void CpuView::draw_boxes(const FrameRequest& request, FrameStats& stats) {
+void CpuView::draw_boxes(FrameStats& stats) {
   StageClock clock(stats);
-  const FramePlan plan{.window_end = request.camera};
+  const FramePlan plan{.window_end = eyes_.front().camera};
   cull_clusters(plan);
-  project(request.camera, plan, segments(), [](std::size_t, std::size_t) {});
+  project(plan, segments(), [](std::size_t, std::size_t) {});
   clock.end(Stage::project);
   lists_.build_by_keys(table(plan), tiles_of_all(), settings_.max_list_entries, *scene_->pool);
   clock.end(Stage::sort);
@@ -140,7 +145,7 @@ void CpuView::draw_lists(const FrameRequest& request, const FramePlan& plan, Fra
   const std::size_t shares = segments(), ranks = clusters_.size();
   lists_.begin(tiles_of_all(), shares, settings_.max_list_entries);
   // Listed while the splats are in cache. Reading them again would cost as much as the listing.
-  project(request.camera, plan, shares, [&](std::size_t segment, std::size_t rank) {
+  project(plan, shares, [&](std::size_t segment, std::size_t rank) {
     for (std::size_t e = 0; e < eyes_.size(); ++e)
       lists_.add(segment, table(plan).of_cluster(e * ranks + rank), scene_->kernels);
   });
@@ -159,10 +164,10 @@ void CpuView::draw_cached_lists(const Camera& camera, FrameStats& stats) {
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       if (counts_[rank] == 0) continue;
-      summaries_[rank] =
-          scene_->kernels.refresh_cluster({&scene_->store(), &camera, clusters_[rank],
-                                           &members_[rank], splats_.data() + rank * cluster_size,
-                                           min_depth, shares_[rank], colours_of(rank, camera)});
+      summaries_[rank] = scene_->kernels.refresh_cluster(
+          {&scene_->store(), &camera, clusters_[rank], &members_[rank],
+           splats_.data() + rank * cluster_size, min_depth, shares_[rank],
+           colours_of(rank, eyes_.front())});
     }
   });
   clock.end(Stage::project);
@@ -243,26 +248,18 @@ glm::ivec2 CpuView::tiles_of_all() const {
   return tiles_ * glm::ivec2(1, static_cast<int>(eyes_.size()));
 }
 
-/// `head`: where the colours are seen from.
-ClusterColours CpuView::colours_of(std::size_t rank, const Camera& head) {
-  if (!colours_) return {nullptr, nullptr};
+/// The colours of a cluster that an eye has seen.
+ClusterColours CpuView::colours_of(std::size_t rank, EyeBuffers& eye) const {
+  if (!eye.colours) return {nullptr, nullptr};
   const std::uint32_t cluster = clusters_[rank];
   const std::uint64_t page = paged_ ? paged_->table().shape().page_of(nodes_[rank]) : 0;
-  return colours_->of_cluster(cluster, page, scene_->store().clusters()[cluster], colour_eye(head));
-}
-
-/// Whether all eyes may see a cluster's colours from the middle of the head: where a View that
-/// reuses colours would do so after such a step.
-bool CpuView::share_colours(const Cluster& bounds, const Camera& head) const {
-  return colours_ && std::ranges::all_of(eyes_, [&](const EyeBuffers& eye) {
-           return colours_hold(bounds, colour_eye(head), colour_eye(eye.camera));
-         });
+  return eye.colours->of_cluster(cluster, page, scene_->store().clusters()[cluster],
+                                 colour_eye(eye.camera));
 }
 
 /// Projects the visible clusters in `shares` and calls done(share, rank) after each.
 template <class Done>
-void CpuView::project(const Camera& head, const FramePlan& plan, std::size_t shares,
-                      const Done& done) {
+void CpuView::project(const FramePlan& plan, std::size_t shares, const Done& done) {
   const bool sweeps = plan.window > 0;
   const std::size_t ranks = clusters_.size(), slots = ranks * cluster_size;
   grow(splats_, slots * eyes_.size());
@@ -272,29 +269,26 @@ void CpuView::project(const Camera& head, const FramePlan& plan, std::size_t sha
   counts_.resize(ranks * eyes_.size());
   // A key frame of the paper without a window is an exact frame.
   const bool is_exact = settings_.pipeline == Pipeline::paper && !sweeps;
-  const float min_depth = speculation_min_depth(settings_.speculation, head.near_z);
-  const glm::vec3 middle = colour_eye(head);
-  const EyeBuffers& left = eyes_.front();
+  EyeBuffers &left = eyes_.front(), &right = eyes_.back();
+  const float min_depth = speculation_min_depth(settings_.speculation, left.camera.near_z);
   scene_->pool->parallel_for(shares, [&](std::size_t share) {
     for (std::size_t rank = ranks * share / shares; rank < ranks * (share + 1) / shares; ++rank) {
       const std::size_t first = rank * cluster_size;
-      const bool shared = share_colours(scene_->store().clusters()[clusters_[rank]], head);
-      ProjectTask task{
-          .scene = &scene_->store(),
-          .camera = &left.camera,
-          .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
-          .cluster = clusters_[rank],
-          .splats = splats_.data() + first,
-          .min_depth = min_depth,
-          .share = shares_[rank],
-          .limits = left.occlusion.limits(),
-          .colours = shared ? colours_of(rank, head) : ClusterColours{nullptr, nullptr},
-          .window_end = &plan.window_end,
-          .paths = sweeps ? paths_.data() + first : nullptr,
-          .members = sweeps ? &members_[rank] : nullptr};
+      ProjectTask task{.scene = &scene_->store(),
+                       .camera = &left.camera,
+                       .pipeline = is_exact ? Pipeline::exact : settings_.pipeline,
+                       .cluster = clusters_[rank],
+                       .splats = splats_.data() + first,
+                       .min_depth = min_depth,
+                       .share = shares_[rank],
+                       .limits = left.occlusion.limits(),
+                       .colours = colours_of(rank, left),
+                       .window_end = &plan.window_end,
+                       .paths = sweeps ? paths_.data() + first : nullptr,
+                       .members = sweeps ? &members_[rank] : nullptr};
       if (eyes_.size() > 1)
-        task.second = {&eyes_.back().camera, splats_.data() + slots + first,
-                       eyes_.back().occlusion.limits(), shared ? &middle : nullptr};
+        task.second = {&right.camera, splats_.data() + slots + first, right.occlusion.limits(),
+                       colours_of(rank, right)};
       summaries_[rank] = scene_->kernels.project_cluster(task);
       counts_[rank] = summaries_[rank].visible;
       if (eyes_.size() > 1) counts_[ranks + rank] = summaries_[rank].visible_to_second;
@@ -355,10 +349,11 @@ std::size_t CpuView::memory_bytes() const {
   const auto bytes = [](const auto& buffer) { return buffer.capacity() * sizeof(buffer[0]); };
   std::size_t of_eyes = 0;
   for (const EyeBuffers& eye : both_eyes_)
-    of_eyes += eye.occlusion.memory_bytes() + eye.depths.memory_bytes();
-  return image_.memory_bytes() + (colours_ ? colours_->memory_bytes() : 0) + lists_.memory_bytes() +
-         of_eyes + bytes(inverse_depths_) + bytes(clusters_) + bytes(shares_) + bytes(nodes_) +
-         bytes(members_) + bytes(summaries_) + bytes(counts_) + bytes(splats_) + bytes(paths_);
+    of_eyes += eye.occlusion.memory_bytes() + eye.depths.memory_bytes() +
+               (eye.colours ? eye.colours->memory_bytes() : 0);
+  return image_.memory_bytes() + lists_.memory_bytes() + of_eyes + bytes(inverse_depths_) +
+         bytes(clusters_) + bytes(shares_) + bytes(nodes_) + bytes(members_) + bytes(summaries_) +
+         bytes(counts_) + bytes(splats_) + bytes(paths_);
 }
 
 }  // namespace catgs

@@ -54,26 +54,26 @@ class CpuView final : public View {
     ImagePlanes picture;  // in image_
     Occlusion occlusion;  // Pipeline::catgs
     DepthSampler depths;
+    std::optional<ColourCache> colours{};
   };
 
   FrameView draw(const FrameRequest& request, const FramePlan& plan);
   void begin_eyes(const FrameRequest& request);
-  void draw_boxes(const FrameRequest& request, FrameStats& stats);
+  void draw_boxes(FrameStats& stats);
   void draw_lists(const FrameRequest& request, const FramePlan& plan, FrameStats& stats);
   void draw_cached_lists(const Camera& camera, FrameStats& stats);
   void cull_clusters(const FramePlan& plan);
   void cut_tree(const FrameRequest& request, const FramePlan& plan);
   [[nodiscard]] bool is_hidden(const Cluster& bounds) const;
   template <class Done>
-  void project(const Camera& head, const FramePlan& plan, std::size_t shares, const Done& done);
+  void project(const FramePlan& plan, std::size_t shares, const Done& done);
   std::uint64_t blend(const FrameRequest& request);
   [[nodiscard]] DepthGrid finish_depths(glm::ivec2 cells);
   void summarise(FrameStats& stats) const;
   [[nodiscard]] std::size_t segments() const;
   [[nodiscard]] SplatTable table(const FramePlan& plan) const;
   [[nodiscard]] glm::ivec2 tiles_of_all() const;
-  ClusterColours colours_of(std::size_t rank, const Camera& head);
-  [[nodiscard]] bool share_colours(const Cluster& bounds, const Camera& head) const;
+  ClusterColours colours_of(std::size_t rank, EyeBuffers& eye) const;
 
   std::shared_ptr<const CpuScene> scene_;
   ViewSettings settings_;
@@ -90,7 +90,6 @@ class CpuView final : public View {
   std::vector<std::uint32_t> counts_;      // [eye][rank]: visible Gaussians
   std::vector<Splat> splats_;              // [slot], see SplatTable
   std::vector<SplatPath> paths_;           // [slot]
-  std::optional<ColourCache> colours_;
   TileLists lists_;
   std::vector<float> inverse_depths_;  // of both eyes
   float mean_inverse_depth_ = 0.0f;    // of the last frame

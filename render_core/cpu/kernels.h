@@ -63,7 +63,7 @@ struct SecondEye {
   const Camera* camera = nullptr;  // null: the frame has one eye
   Splat* splats = nullptr;         // as those of the first eye
   DepthLimits limits{};
-  const glm::vec3* colours_from = nullptr;  // of both eyes, world; null: each sees its own colours
+  ClusterColours colours{nullptr, nullptr};
 };
 
 /// Projects and shades the Gaussians of one cluster. The visible ones go to the front of `splats`,

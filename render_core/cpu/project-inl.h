@@ -82,8 +82,8 @@ HWY_INLINE void write_paths(const Sweep<Floats>& s, const Floats& log2_opacity, 
 /// An eye of a task, and the splats that are written for it.
 struct TaskEye {
   const CameraModel<Floats>* camera;
-  Vec3<Floats> colours_from;
   DepthLimits limits;
+  ClusterColours colours;
   Splat* splats;
   std::uint32_t visible;
 };
@@ -93,21 +93,16 @@ struct TaskEyes {
   CameraModel<Floats> second_camera;
   TaskEye eyes[2];
   int count;
-  bool share_colours;  // what the first eye sees is what the second sees
 };
 
 /// `camera`: of the first eye.
-inline void find_eyes(const ProjectTask& task, const CameraModel<Floats>& camera, TaskEyes& out) {
+inline void set_eyes(const ProjectTask& task, const CameraModel<Floats>& camera, TaskEyes& out) {
   const SecondEye& second = task.second;
-  out.eyes[0] = {&camera, camera.eye, task.limits, task.splats, 0};
+  out.eyes[0] = {&camera, task.limits, task.colours, task.splats, 0};
   out.count = second.camera == nullptr ? 1 : 2;
-  out.share_colours = second.colours_from != nullptr;
   if (out.count == 1) return;
   out.second_camera = convert<Floats>(make_camera_model(*second.camera));
-  out.eyes[1] = {&out.second_camera, out.second_camera.eye, second.limits, second.splats, 0};
-  if (!out.share_colours) return;
-  const glm::vec3& from = *second.colours_from;
-  for (TaskEye& eye : out.eyes) eye.colours_from = {Floats(from.x), Floats(from.y), Floats(from.z)};
+  out.eyes[1] = {&out.second_camera, second.limits, second.colours, second.splats, 0};
 }
 
 /// Some Gaussians before they are projected.
@@ -158,7 +153,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
   const Vec2<Floats> last_px{Floats(static_cast<float>(task.camera->size_px.x - 1)),
                              Floats(static_cast<float>(task.camera->size_px.y - 1))};
   TaskEyes eyes;
-  find_eyes(task, context.camera, eyes);
+  set_eyes(task, context.camera, eyes);
   CameraModel<Floats> end_camera;
   if constexpr (sweeps) {
     end_camera = convert<Floats>(make_camera_model(*task.window_end));
@@ -189,8 +184,7 @@ ClusterSummary project_cluster_of(const ProjectTask& task) {
       const std::uint32_t hits =
           project_for<pipeline>(scene, eye, end_camera, last_px, g, s, look, box);
       if (hits == 0) continue;
-      if (hits_of_any == 0 || !eyes.share_colours)
-        look.colour = colour_of(task.colours, scene, i, i - begin, g.mean, eye.colours_from);
+      look.colour = colour_of(eye.colours, scene, i, i - begin, g.mean, eye.camera->eye);
       hits_of_any |= hits;
       if constexpr (sweeps) {
         const Floats reach = max(reach_of(g.log2_opacity), Floats(0.0));

@@ -71,8 +71,9 @@ void TileLists::add(std::size_t segment_index, const ListTask& task, const SimdK
                        segment.runs.end());
   }
   const std::span added = std::span(segment.runs).subspan(known);
-  for (TileRun& run : added) {
-    run.row = static_cast<std::uint16_t>(run.row + task.first_row);
+  if (task.first_row > 0)
+    for (TileRun& run : added) run.row = static_cast<std::uint16_t>(run.row + task.first_row);
+  for (const TileRun& run : added) {
     std::uint32_t* const row = segment.positions.data() + run.row * tiles_across_;
     for (int column = run.begin; column < run.end; ++column) ++row[column];
     segment.entries += run.end - run.begin;

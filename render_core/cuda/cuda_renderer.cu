@@ -10,8 +10,8 @@
 #include <cuda_runtime_api.h>
 
 #include "render_core/cuda/cuda_renderer.h"
-#include "render_core/cuda/cuda_view.cuh"
 #include "render_core/cuda/device_buffer.h"
+#include "render_core/cuda/eye_views.cuh"
 #include "render_core/cuda/place_view.h"
 
 namespace catgs {
@@ -49,11 +49,12 @@ class ViewInSlot final : public View {
     return view_->tile_loads();
   }
   [[nodiscard]] std::size_t memory_bytes() const override { return view_->memory_bytes(); }
+  [[nodiscard]] bool outdated() const override { return view_->outdated(); }
   [[nodiscard]] std::optional<int> device() const override { return slot_.device(); }
 
  private:
   DeviceSet::Slot slot_;
-  std::optional<CudaView> view_;
+  std::optional<EyeViews> view_;
 };
 
 class CudaRenderer final : public Renderer {
@@ -92,6 +93,8 @@ class CudaRenderer final : public Renderer {
     }
     return all;
   }
+
+  [[nodiscard]] bool has_windows(Pipeline pipeline) const override { return has_groups(pipeline); }
 
   [[nodiscard]] std::unique_ptr<View> make_view(const ViewSettings& settings) override {
     std::vector<int> candidates;

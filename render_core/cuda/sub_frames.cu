@@ -13,7 +13,6 @@ void SubFrames::begin_group(const FramePlan& plan, const FrameShape& shape,
   loose_ = follows_ && plan.window > 0;
   key_corner_px_ = {shape.left_px, shape.top_px};
   slack_ = slack;
-  repaired_ = 0;
 }
 
 void SubFrames::place(const FramePlan& plan, FrameShape& shape) const {
@@ -57,7 +56,6 @@ bool SubFrames::lists_hold(const FrameShape& shape, bool reach_known, cudaStream
                       .range = m.range.get(),
                       .reach = reach_known ? m.reach.get() : nullptr,
                       .splat_depth = m.splat_depth.get(),
-                      .shifted = repaired_++ % 2 == 1,
                       .entries = m.entries.get()},
                      stream);
   check(cudaEventSynchronize(projected_.get()), "strays");

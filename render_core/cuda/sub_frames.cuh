@@ -41,7 +41,6 @@ class SubFrames {
   bool loose_ = false;
   glm::ivec2 key_corner_px_{0};  // of the key frame's picture in the grid
   ListSlack slack_;
-  unsigned repaired_ = 0;  // sub-frames of the group
 };
 
 }  // namespace catgs::cuda

@@ -62,7 +62,7 @@ std::string find_mistake(const FrameRequest& request, PixelFormat format) {
     return bad;
   const glm::ivec2 eye_size = request.stereo ? size / glm::ivec2(2, 1) : size;
   if (format == PixelFormat::i420 && (eye_size.x % 2 != 0 || eye_size.y % 2 != 0))
-    return "i420 needs even sides, not " + text_of(eye_size);
+    return "i420 needs even sides, not " + text_of(eye_size) + (request.stereo ? " an eye" : "");
   if (!(camera.near_z > 0 && std::isfinite(camera.near_z))) return "near plane must be positive";
   const ClipBox& clip = camera.clip;
   for (int i = 0; i < 3; ++i)

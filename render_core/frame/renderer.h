@@ -186,6 +186,10 @@ class Renderer {
 
   /// For people: "CPU, AVX3_DL, 2 threads", "CUDA, 2 x NVIDIA H200".
   [[nodiscard]] virtual std::string description() const = 0;
+  /// Whether Views of this pipeline have windows, where frames come with forecasts.
+  [[nodiscard]] virtual bool has_windows(Pipeline pipeline) const {
+    return pipeline == Pipeline::paper;
+  }
   /// Bytes of the scene on one device; each device holds its own copy. Of a scene in pages, the
   /// memory for pages, which it may share with others.
   [[nodiscard]] virtual std::size_t scene_bytes() const = 0;

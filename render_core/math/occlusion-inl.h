@@ -34,7 +34,8 @@ CATGS_HD_INLINE int occlusion_radius(const CameraModel<T>& now, const CameraMode
   }
   // How far near surfaces move against those behind them. With parts of the place alone (radius 0),
   // blocks fell to 13 dB where surfaces came out behind others.
-  const T parallax_px = T(2.0) * now.focal_px.x * mean_inverse_depth * sqrt(dot(step, step));
+  const T focal_px = max(now.focal_px.x, now.focal_px.y);
+  const T parallax_px = T(2.0) * focal_px * mean_inverse_depth * sqrt(dot(step, step));
   if (!(mean_inverse_depth > T(0.0) && parallax_px < T(most_occlusion_px))) return -1;
   return 1 + static_cast<int>(parallax_px / T(part_px));
 }

@@ -19,12 +19,10 @@ const std::initializer_list<std::pair<std::string_view, Pipeline>> pipelines = {
     {"paper", Pipeline::paper},
     {"catgs", Pipeline::catgs}};
 
-/// Options without effect are refused, because they would spoil a comparison silently.
-void refuse_without_groups(const PipelineOptions& options) {
+void refuse_windows(const PipelineOptions& options, std::string_view where,
+                    std::string_view remedy) {
   const auto refuse = [&](bool given, std::string_view flag) {
-    if (!given) return;
-    throw InputError(flag, "", fmt::format("has no effect on the {} pipeline", options.pipeline),
-                     "use --pipeline paper or catgs");
+    if (given) throw InputError(flag, "", fmt::format("has no effect on {}", where), remedy);
   };
   refuse(options.window.has_value(), "--window");
   refuse(options.max_trail_px.has_value(), "--max-trail-px");
@@ -85,7 +83,9 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options) {
 ViewSettings view_settings(const PipelineOptions& options) {
   ViewSettings settings;
   settings.pipeline = parse_name("--pipeline", options.pipeline, pipelines);
-  if (!has_groups(settings.pipeline)) refuse_without_groups(options);
+  if (!has_groups(settings.pipeline))
+    refuse_windows(options, fmt::format("the {} pipeline", options.pipeline),
+                   "use --pipeline paper or catgs");
   if (!keeps_colours(settings.pipeline)) refuse_without_colours(options);
   SpeculationSettings& speculation = settings.speculation;
   if (settings.pipeline == Pipeline::catgs) speculation = following_speculation;
@@ -99,6 +99,12 @@ ViewSettings view_settings(const PipelineOptions& options) {
   settings.colour_cache = !options.no_colour_cache;
   settings.split_tasks = !options.no_split;
   return settings;
+}
+
+void refuse_windows_without(const Renderer& renderer, const PipelineOptions& options) {
+  if (!renderer.has_windows(parse_name("--pipeline", options.pipeline, pipelines)))
+    refuse_windows(options, fmt::format("the {} pipeline of this core", options.pipeline),
+                   "use --renderer cuda, or --pipeline paper");
 }
 
 PipelineOptions with_flags(PipelineOptions options, const std::string& flags) {

@@ -34,6 +34,9 @@ void add_speculation_options(CLI::App& command, PipelineOptions& options);
 /// not have.
 ViewSettings view_settings(const PipelineOptions& options);
 
+/// Throws InputError for an option of windows that Views of this renderer do not have.
+void refuse_windows_without(const Renderer& renderer, const PipelineOptions& options);
+
 /// The options with additional flags for their pipeline, written as on a command line. Throws
 /// InputError for what the command line would refuse; the error names --variant, where users give
 /// such flags.

@@ -155,7 +155,7 @@ void add_stereo_options(CLI::App& command, RenderOptions& options) {
   auto* stereo = command.add_flag(
       "--stereo", options.stereo,
       "Draw both eyes side by side, the left one left. --size and the lens are those of an eye, so "
-      "pictures are twice as wide; the path is that of the head");
+      "pictures are twice as wide; the path is that of the head. All frames are key frames");
   stereo->excludes(command.get_option("--orthographic"));
   command
       .add_option("--eye-distance", options.eye_distance,
@@ -249,6 +249,7 @@ RenderSetup prepare_scene(const RenderOptions& options, bool quiet) {
   setup.pool = std::make_shared<ThreadPool>(options.threads);
   core.pool = setup.pool;
   setup.made = setup.tree ? make_renderer(setup.tree, core) : make_renderer(setup.cloud, core);
+  refuse_windows_without(*setup.made.renderer, options.pipeline);
   return setup;
 }
 

@@ -47,6 +47,14 @@ std::int64_t refresh_after(std::int64_t time_us, int hz) {
   return ((time_us * hz / 1'000'000 + 1) * 1'000'000 + hz - 1) / hz;
 }
 
+/// Both eyes, in a world of metres.
+Stereo eyes_of(const SessionSettings& settings) {
+  constexpr float eye_distance = 0.064f;
+  const float focal_px =
+      focal_from_fov_y(glm::radians(settings.wishes.fov_y_deg), settings.size_px.y);
+  return eyes_like(make_camera({}, settings.size_px, focal_px), eye_distance);
+}
+
 }  // namespace
 
 Connection::Connection(const SessionSettings& settings, SessionContext context, SessionState& state,
@@ -119,14 +127,16 @@ glm::dvec2 Connection::overscan() const {
 v1::Settings Connection::wanted_settings() const {
   v1::Settings settings;
   const glm::dvec2 sides = overscan();
-  const bool smaller = settings_.moving_size_px.x > 0;
-  if (smaller || sides != glm::dvec2(1.0)) {
+  const bool smaller = settings_.moving_size_px.x > 0, stereo = settings_.wishes.stereo;
+  if (smaller || stereo || sides != glm::dvec2(1.0)) {
     const glm::ivec2 moving_px = smaller ? settings_.moving_size_px : settings_.size_px;
-    settings.set_width_px(frame_side(moving_px.x * sides.x));
+    const double across = stereo ? 2.0 * sides.x : sides.x;
+    settings.set_width_px(frame_side(moving_px.x * across));
     settings.set_height_px(frame_side(moving_px.y * sides.y));
-    settings.set_still_width_px(frame_side(settings_.size_px.x * sides.x));
+    settings.set_still_width_px(frame_side(settings_.size_px.x * across));
     settings.set_still_height_px(frame_side(settings_.size_px.y * sides.y));
   }
+  if (stereo) *settings.mutable_stereo() = to_wire(eyes_of(settings_));
   settings.set_max_fps(static_cast<std::uint32_t>(settings_.wishes.fps));
   settings.set_max_bitrate_kbps(static_cast<std::uint32_t>(settings_.wishes.max_bitrate_kbps));
   settings.set_fixed_quality(settings_.wishes.fixed_quality);

@@ -159,7 +159,8 @@ void DecodeStage::keep_picture(const Item& item, Decoded& decoded) {
                               .fov_y_rad = item.header.fov_y_rad(),
                               .near_z = scene_.near_z(),
                               .scene_id = scene_.scene_id(),
-                              .picture = std::move(decoded.picture)});
+                              .picture = std::move(decoded.picture),
+                              .stereo = stereo_of(item.header)});
 }
 
 void DecodeStage::keep_frame(Item& item) {
@@ -194,7 +195,8 @@ void DecodeStage::keep_still(const Item& item, const Decoded& decoded) {
                               .scene_id = scene_.scene_id(),
                               .picture = decoded.picture,
                               .rest = report_.rest->number,
-                              .after_us = after_us});
+                              .after_us = after_us,
+                              .stereo = stereo_of(item.header)});
 }
 
 }  // namespace catgs::load

@@ -101,11 +101,13 @@ void add_client_options(CLI::App& app, GroupOptions& group) {
   app.add_flag("--fixed-quality", wishes.fixed_quality,
                "Ask the server not to adapt bitrate, size and rate to the link");
   app.add_option("--fov-deg", wishes.fov_y_deg, "Vertical field of view")->capture_default_str();
+  auto* stereo = app.add_flag("--stereo", wishes.stereo,
+                              "Wear a headset: pictures of both eyes. Sizes are those of an eye");
   app.add_option_function<std::string>(
       "--link", [&group](const std::string& text) { group.link = parse_link("--link", text); },
       "Each session's line: rate=50mbit@0s,5mbit@10s,up=5mbit,delay=20ms,jitter=5ms,"
       "loss=1%,burst=4,queue=200ms,congestion=cubic; each part may be left out");
-  auto* glass = add_display_options(app, group.display);
+  auto* glass = add_display_options(app, group.display)->excludes(stereo);
   auto* decode = app.add_flag("--decode", manners.decode, "Decode every frame and check its size");
   app.add_flag("--only-pictures", manners.only_pictures,
                "Decode only what is compared with --check-scene, from an IDR of its own on")

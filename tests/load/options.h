@@ -22,6 +22,7 @@ struct Wishes {
   int max_bitrate_kbps = 0;    // 0: the server's default
   bool fixed_quality = false;  // the server keeps bitrate, size and rate, whatever the link does
   float fov_y_deg = 60.0f;
+  bool stereo = false;  // both eyes of a headset; sizes are those of one
 };
 
 /// How well a client behaves. Times are seconds.

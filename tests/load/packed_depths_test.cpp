@@ -91,6 +91,8 @@ TEST(PackedDepths, CellsAreAboutSquareWhateverTheShapeOfThePicture) {
   EXPECT_EQ(depth_cells_of({1280, 720}), glm::ivec2(64, 36));
   EXPECT_EQ(depth_cells_of({720, 1280}), glm::ivec2(36, 64));
   EXPECT_EQ(depth_cells_of({8192, 16}), glm::ivec2(128, 2));
+  EXPECT_EQ(depth_cells_of({2 * 1680, 1760}, 2), glm::ivec2(2 * 47, 49));
+  EXPECT_EQ(depth_cells_of({2 * 8192, 16}, 2), glm::ivec2(128, 2));
 }
 
 }  // namespace

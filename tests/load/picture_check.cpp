@@ -99,10 +99,12 @@ void ExactPictures::load(const std::string& scene_id) {
   loaded_ = std::make_unique<Loaded>(scene_id, std::move(entry), std::move(view));
 }
 
-Image ExactPictures::draw(const std::string& scene_id, const Camera& camera) {
+Image ExactPictures::draw(const std::string& scene_id, const Camera& camera,
+                          const std::optional<Stereo>& stereo) {
   if (!loaded_ || loaded_->scene_id != scene_id) load(scene_id);
   FrameRequest request;
   request.camera = camera;
+  request.stereo = stereo;
   FrameView truth;
   const RenderStatus status = loaded_->view->render(request, truth);
   if (!status.ok()) throw std::runtime_error(status.message);
@@ -118,8 +120,8 @@ void check_pictures(const std::vector<std::string>& scenes, RunReport& report) {
         const Camera camera =
             make_camera(sample.render_pose, size_px, focal_from_fov_y(sample.fov_y_rad, size_px.y),
                         sample.near_z);
-        sample.psnr_db = psnr_db(
-            mean_squared_error(exact.draw(sample.scene_id, camera), rgb_of(sample.picture)));
+        const Image truth = exact.draw(sample.scene_id, camera, sample.stereo);
+        sample.psnr_db = psnr_db(mean_squared_error(truth, rgb_of(sample.picture)));
       }
     }
   }

@@ -23,7 +23,8 @@ class ExactPictures {
   ~ExactPictures();
 
   /// Throws InputError for a scene that cannot be read, and where none has that id.
-  Image draw(const std::string& scene_id, const Camera& camera);
+  Image draw(const std::string& scene_id, const Camera& camera,
+             const std::optional<Stereo>& stereo = {});
 
  private:
   void load(const std::string& scene_id);

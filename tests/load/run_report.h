@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render_core/math/camera.h"
+#include "render_core/math/stereo.h"
 #include "server/encode/decoder.h"
 #include "tests/load/display.h"
 #include "tests/load/session_stats.h"
@@ -23,6 +24,7 @@ struct PictureSample {
   double psnr_db = 0.0;       // once check_pictures() has judged it
   int rest = 0;               // counted from 1: the camera rests; 0: taken as it went
   std::int64_t after_us = 0;  // at rest: decoded so long after the last pose that moved
+  std::optional<Stereo> stereo{};
 };
 
 /// Pictures of so many rests are kept: they stay in memory until the end.

@@ -67,4 +67,28 @@ Pose from_wire(const v1::Pose& world_from_camera) {
   return {from_wire(world_from_camera.position()), glm::quat(q.w(), q.x(), q.y(), q.z())};
 }
 
+v1::Stereo to_wire(const Stereo& eyes) {
+  const auto fill = [](const catgs::Eye& eye, v1::Eye& out) {
+    out.set_right_of_pose(eye.offset.x);
+    out.set_below_pose(eye.offset.y);
+    out.set_left(eye.low.x);
+    out.set_right(eye.high.x);
+    out.set_up(eye.low.y);
+    out.set_down(eye.high.y);
+  };
+  v1::Stereo stereo;
+  fill(eyes.front(), *stereo.mutable_left());
+  fill(eyes.back(), *stereo.mutable_right());
+  return stereo;
+}
+
+std::optional<Stereo> stereo_of(const v1::FrameHeader& header) {
+  if (!header.has_stereo()) return {};
+  const auto eye = [](const v1::Eye& e) {
+    return catgs::Eye{
+        {e.right_of_pose(), e.below_pose()}, {e.left(), e.up()}, {e.right(), e.down()}};
+  };
+  return Stereo{eye(header.stereo().left()), eye(header.stereo().right())};
+}
+
 }  // namespace catgs::load

@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
 
 #include "proto/catgs.pb.h"
 #include "render_core/math/camera.h"
+#include "render_core/math/stereo.h"
 
 namespace catgs::load {
 
@@ -32,5 +34,8 @@ std::variant<v1::ServerMessage, FrameMessage, WireError> parse_server_message(
 v1::Pose to_wire(const Pose& world_from_camera);
 glm::vec3 from_wire(const v1::Vec3& v);
 Pose from_wire(const v1::Pose& world_from_camera);
+v1::Stereo to_wire(const Stereo& eyes);
+/// The eyes that a frame shows; nothing: one.
+std::optional<Stereo> stereo_of(const v1::FrameHeader& header);
 
 }  // namespace catgs::load

@@ -106,7 +106,7 @@ Json settings_json(const RenderOptions& options, const RenderSetup& setup,
   json["near"] = setup.camera.near_z;
   const ViewSettings& settings = result.settings;
   json["pipeline"] = pipeline_name(settings.pipeline);
-  if (has_groups(settings.pipeline)) {
+  if (setup.made.renderer->has_windows(settings.pipeline)) {
     const SpeculationSettings& speculation = settings.speculation;
     json["window"] = speculation.initial_window;
     json["max_trail_px"] = speculation.max_trail_px;
@@ -242,7 +242,7 @@ Json report_json(const RenderOptions& options, const RenderSetup& setup,
 void print_report(const RenderSetup& setup, const BenchResult& result) {
   const Measurement& measurement = result.measurement;
   const ListLength lists = measurement.list_length();
-  const bool groups = has_groups(result.settings.pipeline);
+  const bool groups = setup.made.renderer->has_windows(result.settings.pipeline);
   fmt::print("{}, {} Gaussians, SH {}; {}x{}, {} pipeline\n", setup.scene.name, setup.gaussians(),
              setup.cloud->sh_degree, setup.picture_px().x, setup.picture_px().y,
              pipeline_name(result.settings.pipeline));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <string_view>
 
@@ -39,25 +40,31 @@ void write_npy(const std::filesystem::path& path, glm::ivec2 size_px,
 }
 
 void write_picture(const std::filesystem::path& path, const FrameView& frame,
-                   const FrameLayers& layers, const PictureCamera& camera) {
-  write_png(path, copy_image(frame), layers.alpha, {}, {camera_key, camera_text(camera)});
+                   const FrameLayers& layers, const std::optional<PictureCamera>& camera) {
+  const PngText text = camera ? PngText{camera_key, camera_text(*camera)} : PngText{};
+  write_png(path, copy_image(frame), layers.alpha, {}, text);
   if (!layers.depth.empty())
     write_npy(std::filesystem::path(path).replace_extension(".npy"), frame.size_px, layers.depth);
+}
+
+std::optional<PictureCamera> told(const Camera& camera, const glm::dvec3& origin, bool tells) {
+  return tells ? std::optional(PictureCamera{camera, origin}) : std::nullopt;
 }
 
 class PngSink final : public FrameSink {
  public:
   explicit PngSink(const FrameSinkSettings& settings)
-      : path_(settings.path), origin_(settings.origin) {}
+      : path_(settings.path), tells_cameras_(settings.tells_cameras), origin_(settings.origin) {}
 
   PixelFormat format() const override { return PixelFormat::rgb_f32; }
   void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
-    write_picture(path_, frame, layers, {camera, origin_});
+    write_picture(path_, frame, layers, told(camera, origin_, tells_cameras_));
   }
   void finish() override {}
 
  private:
   std::filesystem::path path_;
+  bool tells_cameras_;
   glm::dvec3 origin_;
 };
 
@@ -65,6 +72,7 @@ class PngFolderSink final : public FrameSink {
  public:
   explicit PngFolderSink(const FrameSinkSettings& settings)
       : folder_(settings.path),
+        tells_cameras_(settings.tells_cameras),
         origin_(settings.origin),
         number_(settings.first_frame),
         names_(settings.names) {
@@ -77,12 +85,13 @@ class PngFolderSink final : public FrameSink {
   void write(const FrameView& frame, const FrameLayers& layers, const Camera& camera) override {
     const std::string name =
         names_.empty() ? fmt::format("frame_{:06}", number_++) : names_.at(written_++);
-    write_picture(folder_ / (name + ".png"), frame, layers, {camera, origin_});
+    write_picture(folder_ / (name + ".png"), frame, layers, told(camera, origin_, tells_cameras_));
   }
   void finish() override {}
 
  private:
   std::filesystem::path folder_;
+  bool tells_cameras_;
   glm::dvec3 origin_;
   std::size_t number_, written_ = 0;
   std::vector<std::string> names_;

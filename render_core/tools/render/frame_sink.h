@@ -33,6 +33,7 @@ struct FrameSinkSettings {
   std::size_t first_frame = 0;       // number of the first picture in a folder
   std::vector<std::string> names{};  // of the pictures in a folder, without extension; or numbers
   glm::dvec3 origin{0.0};            // of the scene; pictures tell cameras from the file's 0
+  bool tells_cameras = true;         // pictures do
   bool layers = false;               // frames come with layers, which only pictures can hold
 };
 

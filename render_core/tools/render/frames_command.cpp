@@ -118,6 +118,7 @@ std::unique_ptr<FrameSink> make_sink(const FramesOptions& options, const RenderS
                                .first_frame = setup.first,
                                .names = names,
                                .origin = setup.scene.hints.origin,
+                               .tells_cameras = !setup.eye_distance,
                                .layers = options.alpha || options.depth});
   if (options.out.ends_with(".png") && setup.poses.size() != 1) {
     throw InputError(options.out, "", fmt::format("one picture for {} frames", setup.poses.size()),

@@ -87,21 +87,23 @@ TEST_F(StereoViews, HalvesAreWhatEachEyeSees) {
   }
 }
 
-// Colours that depend much on the direction, from so far that a View may see them from the middle
-// of the head.
-TEST_F(StereoViews, FarColoursAreThoseOfEachEye) {
+// Colours that depend much on the direction, while the head moves as little as a View may reuse
+// them.
+TEST_F(StereoViews, ColoursAreThoseOfEachEye) {
   const auto renderer =
       core_renderer_of(std::make_shared<const GaussianCloud>(random_cloud(4'000, 3, 8)));
   const Stereo eyes{Eye{{-0.032f, 0.0f}, {-0.15f, -0.1f}, {0.1f, 0.1f}},
                     Eye{{0.032f, 0.0f}, {-0.1f, -0.1f}, {0.15f, 0.1f}}};
-  const FrameRequest request = stereo_request(look_at({0, 0, -15}, {0, 0, 5}), {320, 128}, eyes);
+  FrameRequest request = stereo_request(look_at({0, 0, -15}, {0, 0, 5}), {320, 128}, eyes);
   for (const Bound& bound : bounds) {
     SCOPED_TRACE(static_cast<int>(bound.pipeline));
     const ViewSettings settings{.pipeline = bound.pipeline};
     const auto view = renderer->make_view(settings), left = renderer->make_view(settings),
                right = renderer->make_view(settings);
-    for (int frame = 0; frame < 2; ++frame)
-      expect_halves_of(*view, *left, *right, request, std::min(bound.least_db, 55.0));
+    for (const float step : {0.0f, 0.02f, 0.04f}) {
+      request.camera.world_from_camera.position.x = step;
+      expect_halves_of(*view, *left, *right, request, bound.least_db);
+    }
   }
 }
 
@@ -110,6 +112,14 @@ TEST_F(StereoViews, ExactPicturesEqualTheReference) {
   FrameRequest request = stereo_request({});
   request.depth_cells = {16, 8};
   const auto oracle = core_renderer_of(cloud, RendererKind::reference)->make_view({});
+  const auto grid_of = [&](const FrameRequest& asked) {
+    FrameView frame;
+    EXPECT_TRUE(oracle->render(asked, frame).ok());
+    return std::vector<float>(frame.depths.inverse_depths.begin(),
+                              frame.depths.inverse_depths.end());
+  };
+  const std::vector<float> both = grid_of(request), left = grid_of(request_of_eye(request, 0));
+  for (std::size_t i = 0; i < left.size(); ++i) ASSERT_EQ(both[i / 8 * 16 + i % 8], left[i]) << i;
   const Rendered expected = render_in(*oracle, request);
   EXPECT_GE(psnr_db(render_in(*core_renderer_of(cloud)->make_view({}), request).rgb, expected.rgb),
             60.0);
@@ -137,24 +147,33 @@ TEST_F(StereoViews, HalvesOfMovingHeadsStayRight) {
   EXPECT_LT(drawn, all / 2) << "the wall hides what is behind it";
 }
 
-/// A square before one eye's picture only, wide enough to reach beyond its edge.
-TEST_F(StereoViews, NothingLeaksIntoTheOtherHalf) {
+/// A square that reaches beyond the inner edge of one eye's picture, `side` of the head: 1 for the
+/// left eye. The other eye looks away.
+void expect_no_leak(float side) {
   GaussianCloud cloud;
-  add_opaque(cloud, {1.2f, 0.0f, 2.0f}, {0.3f, 0.3f, 0.01f}, glm::vec3(2.0f));
+  add_opaque(cloud, {side * 1.2f, 0.0f, 2.0f}, {0.3f, 0.3f, 0.01f}, glm::vec3(2.0f));
   const auto renderer = core_renderer_of(std::make_shared<const GaussianCloud>(std::move(cloud)));
-  FrameRequest request = stereo_request({}, {2 * 70, 64},
-                                        {Eye{{-0.05f, 0.0f}, {-1.0f, -1.0f}, {0.6f, 1.0f}},
-                                         Eye{{0.05f, 0.0f}, {-3.0f, -1.0f}, {-1.0f, 1.0f}}});
+  const std::size_t seeing = side > 0.0f ? 0 : 1;
+  Stereo eyes{Eye{{-0.05f, 0.0f}, {1.0f, -1.0f}, {3.0f, 1.0f}},
+              Eye{{0.05f, 0.0f}, {-3.0f, -1.0f}, {-1.0f, 1.0f}}};
+  eyes[seeing].low.x = side > 0.0f ? -1.0f : -0.6f;
+  eyes[seeing].high.x = side > 0.0f ? 0.6f : 1.0f;
+  const FrameRequest request = stereo_request({}, {2 * 70, 64}, eyes);
   for (const Bound& bound : bounds) {
     SCOPED_TRACE(static_cast<int>(bound.pipeline));
     const auto view = renderer->make_view({.pipeline = bound.pipeline});
     const std::vector<float> rgb = render_in(*view, request).rgb;
-    const auto left = half_of(rgb, request.camera.size_px, 0);
-    const auto right = half_of(rgb, request.camera.size_px, 1);
-    EXPECT_GT(*std::ranges::max_element(left), 0.8f);
-    for (std::size_t i = 0; i < right.size(); ++i)
-      ASSERT_NEAR(right[i], request.background[static_cast<int>(i % 3)], 1e-6f) << i;
+    const auto seen = half_of(rgb, request.camera.size_px, seeing);
+    const auto other = half_of(rgb, request.camera.size_px, 1 - seeing);
+    EXPECT_GT(*std::ranges::max_element(seen), 0.8f);
+    for (std::size_t i = 0; i < other.size(); ++i)
+      ASSERT_NEAR(other[i], request.background[static_cast<int>(i % 3)], 1e-6f) << i;
   }
+}
+
+TEST_F(StereoViews, NothingLeaksIntoTheOtherHalf) {
+  expect_no_leak(1.0f);
+  expect_no_leak(-1.0f);
 }
 
 TEST_F(StereoViews, TreesAndClipsServeBothEyes) {

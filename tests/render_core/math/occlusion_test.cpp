@@ -95,6 +95,13 @@ TEST(OcclusionRadius, GrowsWithTheParallaxOfAStep) {
   EXPECT_EQ(radius(0.34f), 8);   // 31.1 px
   EXPECT_EQ(radius(0.36f), -1);  // 32.9 px
   EXPECT_EQ(math::occlusion_radius<double>(model_of({}), model_of({}), 0.0, 8), -1) << "no depth";
+  // Pixels that are not square: a step down moves things by the longer focal length.
+  Camera tall;
+  tall.size_px = {320, 180};
+  tall.focal_px = {40.0f, 480.0f};
+  const auto still = math::make_camera_model(tall);
+  tall.world_from_camera.position.y = 0.02f;
+  EXPECT_EQ(math::occlusion_radius<double>(math::make_camera_model(tall), still, 0.25, 4), 2);
 }
 
 }  // namespace

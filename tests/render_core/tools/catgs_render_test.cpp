@@ -217,6 +217,9 @@ TEST_F(CatgsRender, BadInputExitsWithTwoAndSaysWhatToDo) {
   expect(frames("--script orbit --out " + path("a.png")), "one picture for 300 frames");
   expect(frames("--script still --frames 2000: --out x"), "the path has 300 frames");
   expect(frames(still + "--window 2 --out x"), "--window: has no effect on the exact pipeline");
+  expect(frames(still + "--renderer cpu --pipeline catgs --window 2 --out x"),
+         "--window: has no effect on the catgs pipeline of this core (use --renderer cuda, or "
+         "--pipeline paper)");
   expect(frames(still + "--pipeline paper --window -1 --out x"), "--window: is out of range");
   expect(frames("--trace x --duration 2 --out x"), "--duration: has no effect on a recorded trace");
   expect(frames("--trace x --seed 1 --out x"), "--seed: has no effect on a recorded trace");

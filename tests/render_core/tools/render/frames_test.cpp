@@ -401,6 +401,7 @@ TEST_F(Frames, StereoPicturesShowBothEyes) {
   draw("both.png", "--stereo --eye-distance 0.6");
   const Image both = read_png(path("both.png"));
   ASSERT_EQ(both.size_px, glm::ivec2(128, 48));
+  EXPECT_EQ(bytes_of("both.png").find("catgs-camera"), std::string::npos) << "no camera drew both";
   // The wall is 3 away and begins right of the head, so its edge lies 40 * 0.6 / 3 px apart.
   const auto begin_in = [&](int left_px) {
     int column = left_px;
