@@ -246,7 +246,7 @@ describe('a visitor with a headset', () => {
     await expect
       .poll(() => page.evaluate(async () => (await window.catgs!.stats()).headset_hz))
       .toBeGreaterThan(1);
-    // What changes with each pose does not ask for another stream.
+    // Rounding differs with each pose, and does not ask for another stream.
     expect(settings_of(peer!).length).toBeLessThanOrEqual(asked + 3);
     expect(errors).toEqual([]);
   });

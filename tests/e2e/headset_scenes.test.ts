@@ -1,4 +1,4 @@
-// What a visitor with a headset does in scenes of the real server: teleport, stops, hotspots and portals.
+// A visitor with a headset in scenes of the real server: teleport, stops, hotspots and portals.
 import path from 'node:path';
 import type { Page } from 'playwright-core';
 import { beforeAll, expect, it } from 'vitest';

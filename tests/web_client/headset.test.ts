@@ -1,4 +1,4 @@
-// What the eyes of a headset see, and what the server is asked for.
+// The eyes of a headset: their frusta, and the stream that the server is asked for.
 import { create } from '@bufbuild/protobuf';
 import { describe, expect, it } from 'vitest';
 import {

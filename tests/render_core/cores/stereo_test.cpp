@@ -30,7 +30,7 @@ FrameRequest stereo_request(const Pose& head, glm::ivec2 size_px = {320, 192},
   return request;
 }
 
-/// What one eye of a request sees, as a request of its own.
+/// A request for one eye of a request for both.
 FrameRequest request_of_eye(const FrameRequest& both, std::size_t eye) {
   FrameRequest request = both;
   request.camera = cameras_of(both)[eye];
