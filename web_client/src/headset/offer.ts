@@ -7,6 +7,11 @@ import type { Headset, HeadsetParts } from './headset';
 const look_again_ms = 10_000;
 
 type WithXr = Navigator & { readonly xr?: XRSystem };
+type WithPolicy = Document & { readonly featurePolicy?: { allowsFeature(name: string): boolean } };
+
+/** Whether the page around this one allows it. To ask all the same would be an error of the page. */
+const is_allowed = (): boolean =>
+  (document as WithPolicy).featurePolicy?.allowsFeature('xr-spatial-tracking') ?? true;
 
 /**
  * Asks in a frame that goes again: browsers keep no page for the way back that has looked at navigator.xr.
@@ -18,14 +23,14 @@ async function has_headset(): Promise<boolean> {
     const { xr } = frame.contentWindow?.navigator as WithXr;
     return (await xr?.isSessionSupported('immersive-vr')) ?? false;
   } catch {
-    return false; // the page around this one does not allow it
+    return false; // browsers without featurePolicy: the page around this one does not allow it
   } finally {
     frame.remove();
   }
 }
 
 export function offer_headset(parts: HeadsetParts): void {
-  if (!('xr' in navigator)) return;
+  if (!('xr' in navigator) || !is_allowed()) return;
   const button = by_id('button-headset', HTMLButtonElement);
   let looked_ms = -Infinity;
   const look = async (): Promise<void> => {
