@@ -130,6 +130,16 @@ it('a visitor goes through a portal, and leaves in the other scene', async () =>
   const scene = (): Promise<string> => page.locator('#scene-name bdi').innerText();
   await expect.poll(scene).toBe('park');
   await expect.poll(() => seen(page, 'headset-park')).toBeGreaterThan(0.3);
+  // Nobody knows a walkable area here: the visitor comes to what they point at, beside the panel.
+  const arrived = await pose_of(page);
+  await put(page, 'right', pointing([0.7, -1.3, 0.3], [1.4, 0, 2.5]));
+  await expect
+    .poll(async () => {
+      await hold(page);
+      return distance(await pose_of(page), arrived);
+    })
+    .toBeGreaterThan(0.1);
+  await seen(page, 'headset-park-teleported');
   await page.evaluate(() => window.emulated!.activeSession!.end());
   expect(errors).toEqual([]);
 });
