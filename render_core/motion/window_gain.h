@@ -31,7 +31,7 @@ class WindowGain {
 
   float planned_frames_ = 0.0f, window_frames_ = 0.0f;  // of a group, means; 0: unknown
   float plain_ms_ = 0.0f, key_ms_ = 0.0f;               // of the last of its kind; 0: used up
-  // Of the time of a frame without windows. First guesses, from rooms and cities on one H200.
+  // Shares of the time of a frame without windows. First guesses: rooms and cities on one H200.
   float key_share_ = 1.25f, sub_share_ = 0.73f;
   bool windows_ = false;
   int wait_frames_ = 0;  // before windows are tried again

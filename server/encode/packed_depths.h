@@ -20,7 +20,7 @@ struct PackedDepths {
   std::vector<std::byte> codes;
 };
 
-/// What the depths of an eye take at most in a frame, with the cells of depth_cells_of(), in
+/// The depths of an eye take at most this in a frame, with the cells of depth_cells_of(), in
 /// captured rooms and cities.
 inline constexpr int depth_bits = 9'000;
 

@@ -50,7 +50,7 @@ describe('the room of a visitor', () => {
     ['up', [0, -1, 0]],
   ] as const)('keeps the heading of a camera that looks straight %s', (_, direction) => {
     const rig = new Rig(up, 1);
-    // What is at the upper edge of a view downwards is at the lower edge of a view upwards.
+    // The upper edge of a view downwards shows what the lower edge of a view upwards shows.
     const ahead: Vec3 = [0, 0, 1];
     const orientation = look_at([0, 0, 0], add(direction, scale(ahead, 1e-3)), up);
     rig.place({ position: [0, 0, 0], orientation }, head);

@@ -42,7 +42,7 @@ export function landing(map: WalkMap, points: readonly Vec3[]): Landing {
       const [x, y, b] = add(from, scale(way, (k + 1) / pieces));
       const met = met_in(map, Math.floor(x), Math.floor(y), Math.min(a, b), Math.max(a, b));
       if (met === undefined) continue;
-      // What rises to a floor meets the ceiling below it.
+      // An arc that rises to a floor meets the ceiling below it.
       const stand =
         met === 'blocked' || b > a
           ? undefined

@@ -1,4 +1,4 @@
-// What a headset says of its eyes, and what the server has to draw for them. Pure.
+// The eyes of a headset, and the stream that the server has to draw for them. Pure.
 import { add, conjugate, rotate, scale, sub, type Vec3 } from '../base/vector';
 import type { Pose } from '../camera/eye';
 import {

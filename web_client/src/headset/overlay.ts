@@ -1,5 +1,6 @@
 // Draws what the page adds to the scene inside a headset: signs, lines and shades. Places are in the room.
 import { add, cross, normalize, right, scale, sub, type Vec3 } from '../base/vector';
+import { linked_program } from '../present/depth_mesh';
 
 export type Colour = readonly [red: number, green: number, blue: number, alpha: number];
 
@@ -102,20 +103,7 @@ export class Overlay {
 
   constructor(private readonly gl_: WebGL2RenderingContext) {
     const gl = gl_;
-    this.program_ = gl.createProgram();
-    for (const [type, source] of [
-      [gl.VERTEX_SHADER, vertex_source],
-      [gl.FRAGMENT_SHADER, fragment_source],
-    ] as const) {
-      const shader = gl.createShader(type);
-      if (!shader) continue; // only while the context is lost
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(this.program_, shader);
-    }
-    gl.linkProgram(this.program_);
-    if (!gl.getProgramParameter(this.program_, gl.LINK_STATUS) && !gl.isContextLost())
-      throw new Error(`overlay shader: ${gl.getProgramInfoLog(this.program_) ?? ''}`);
+    this.program_ = linked_program(gl, 'overlay', vertex_source, fragment_source);
     this.projection_ = gl.getUniformLocation(this.program_, 'projection');
     this.view_ = gl.getUniformLocation(this.program_, 'view');
     this.array_ = gl.createVertexArray();

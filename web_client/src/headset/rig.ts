@@ -39,7 +39,7 @@ export const pose_in_room = (transform: {
 function heading_of(orientation: Quat, down: Vec3): Vec3 {
   const view = rotate(orientation, forward);
   const above = rotate(orientation, [0, -1, 0]);
-  // Who looks down sees ahead at the upper edge, and who looks up sees it at the lower one.
+  // A view downwards has what is ahead at its upper edge, and one upwards at its lower edge.
   const towards = add(view, scale(above, 1e-3 * Math.sign(dot(view, down) || 1)));
   return normalize(sub(towards, scale(down, dot(towards, down))), right);
 }

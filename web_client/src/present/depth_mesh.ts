@@ -158,6 +158,30 @@ const all_of_it: TexturePart = {
   most: [mesh_reach, mesh_reach], // the texture repeats its border
 };
 
+/** Throws where the shaders are wrong. While the context is lost, the program draws nothing. */
+export function linked_program(
+  gl: WebGL2RenderingContext,
+  name: string,
+  vertex: string,
+  fragment: string,
+): WebGLProgram {
+  const program = gl.createProgram();
+  for (const [type, source] of [
+    [gl.VERTEX_SHADER, vertex],
+    [gl.FRAGMENT_SHADER, fragment],
+  ] as const) {
+    const shader = gl.createShader(type);
+    if (!shader) continue; // only while the context is lost
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
+    throw new Error(`${name} shader: ${gl.getProgramInfoLog(program) ?? ''}`);
+  return program;
+}
+
 /** Draws meshes with one context. The texture that is bound there is the picture. */
 export class MeshProgram {
   private readonly program_;
@@ -172,21 +196,7 @@ export class MeshProgram {
 
   constructor(private readonly gl_: WebGL2RenderingContext) {
     const gl = gl_;
-    this.program_ = gl.createProgram();
-    for (const [type, source] of [
-      [gl.VERTEX_SHADER, vertex_source],
-      [gl.FRAGMENT_SHADER, fragment_source],
-    ] as const) {
-      const shader = gl.createShader(type);
-      if (!shader) continue; // only while the context is lost
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(this.program_, shader);
-    }
-    gl.linkProgram(this.program_);
-    if (!gl.getProgramParameter(this.program_, gl.LINK_STATUS) && !gl.isContextLost()) {
-      throw new Error(`mesh shader: ${gl.getProgramInfoLog(this.program_) ?? ''}`);
-    }
+    this.program_ = linked_program(gl, 'mesh', vertex_source, fragment_source);
     this.nearness_ = gl.getUniformLocation(this.program_, 'nearness');
     this.part_ = gl.getUniformLocation(this.program_, 'part');
     this.most_ = gl.getUniformLocation(this.program_, 'most');
